@@ -1,0 +1,59 @@
+# Every target builds what it needs from nothing, and at once the second time. ARGS goes to the program that is run.
+
+VENV := .venv
+BIN := $(VENV)/bin
+MADE := $(shell test -x $(BIN)/python && cat $(VENV)/made 2>/dev/null)
+PYTHON ?= $(or $(firstword $(MADE)),python3)
+PIP := PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 \
+       $(BIN)/python -m pip install --quiet
+
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+.PHONY: help demo test lint bench clean
+
+help:  ## what there is to make
+	@sed -n 's/^\([a-z]*\):.*##/make \1#/p' Makefile | while IFS='#' read -r target what; do printf '%-12s%s\n' "$$target" "$$what"; done
+
+demo: $(VENV)/demo  ## learn from real handwriting, and follow a recording that was left out
+	$(BIN)/inphase demo $(ARGS)
+
+test: lint  ## everything that must hold: lint, then the tests (make test ARGS="-k session")
+	$(BIN)/pytest $(ARGS)
+
+lint: $(VENV)/dev  ## style, types and arrows
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(VENV)/demo  ## how long a step takes
+	$(BIN)/python benchmarks/step_time.py $(ARGS)
+
+clean:  ## remove the environment and what the tools leave behind
+	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# An environment runs the code of the folder it was made in, with the Python it was made by: it is made anew where either
+# is another now.
+ifneq ($(strip $(MADE)),$(strip $(PYTHON) $(CURDIR)))
+.PHONY: $(VENV)/made
+endif
+
+$(VENV)/made:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null || { \
+	  echo "expected Python 3.10 or newer, got $$($(PYTHON) --version 2>&1 | tail -n 1); name another: make demo PYTHON=python3.12" >&2; exit 1; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { \
+	  echo "expected a $(PYTHON) with the modules venv and ensurepip, got one without; on Debian and Ubuntu: apt-get install python3-venv" >&2; exit 1; }
+	@if [ -e $@ ]; then rm -rf $(VENV); fi
+	@$(PYTHON) -m venv $(VENV)
+	@echo "$(PYTHON) $(CURDIR)" > $@
+
+$(VENV)/demo: $(VENV)/made pyproject.toml constraints.txt
+	@echo "installing inphase and its demo into $(VENV): once, a minute or two"
+	@$(PIP) -e '.[demo]'
+	@touch $@
+
+$(VENV)/dev: $(VENV)/made pyproject.toml constraints.txt
+	@echo "installing inphase and its tools into $(VENV): once, a minute or two"
+	@$(PIP) -e '.[dev]'
+	@touch $(VENV)/demo $@

@@ -1,0 +1,54 @@
+"""inphase learns how two partners move together, and then moves with one of them live."""
+
+from inphase import basis
+from inphase.channels import Channel, Kind, Role
+from inphase.errors import (
+    ChannelError,
+    DataError,
+    InphaseError,
+    ModelFileError,
+    ObservationError,
+    OptionError,
+)
+from inphase.io import load
+from inphase.model import Model
+from inphase.noise import Noise
+from inphase.phase import PhaseModel
+from inphase.preprocess import trim
+from inphase.preprocess.scaling import Scaling
+from inphase.result import Estimate, Response, Status
+from inphase.session import Session
+from inphase.training import fit, learn_noise, learn_phase
+from inphase.trajectory import Dataset, Demonstration
+from inphase.weight_prior import WeightPrior
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Channel",
+    "ChannelError",
+    "DataError",
+    "Dataset",
+    "Demonstration",
+    "Estimate",
+    "InphaseError",
+    "Kind",
+    "Model",
+    "ModelFileError",
+    "Noise",
+    "ObservationError",
+    "OptionError",
+    "PhaseModel",
+    "Response",
+    "Role",
+    "Scaling",
+    "Session",
+    "Status",
+    "WeightPrior",
+    "basis",
+    "fit",
+    "learn_noise",
+    "learn_phase",
+    "load",
+    "trim",
+]

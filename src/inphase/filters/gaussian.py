@@ -1,0 +1,39 @@
+"""The arithmetic of one Gaussian innovation, shared by all filters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+
+@dataclass(frozen=True)
+class InnovationScore:
+    """How well a sample fitted its prediction, and the means to divide by its covariance."""
+
+    root: Float[np.ndarray, "M M"]
+    log_likelihood: float
+    surprise: float
+
+    def solve(self, columns: Float[np.ndarray, "M K"]) -> Float[np.ndarray, "M K"]:
+        """S⁻¹ @ columns."""
+        from scipy.linalg import cho_solve
+
+        return np.asarray(cho_solve((self.root, True), columns, check_finite=False))
+
+
+def innovation_score(innovation: Float[np.ndarray, " M"], cov: Float[np.ndarray, "M M"]) -> InnovationScore | None:
+    """The Gaussian log-density of an innovation under its covariance S (Eq. 2.7); None where S is not one."""
+    try:
+        root = np.linalg.cholesky(cov)
+    except np.linalg.LinAlgError:
+        return None
+    from scipy.linalg import solve_triangular
+
+    white = solve_triangular(root, innovation, lower=True, check_finite=False)
+    surprise = float(white @ white)
+    log_det = 2 * float(np.log(np.diag(root)).sum())
+    if not (np.isfinite(surprise) and np.isfinite(log_det)):
+        return None
+    return InnovationScore(root, -0.5 * (surprise + log_det + len(innovation) * np.log(2 * np.pi)), surprise)

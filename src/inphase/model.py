@@ -1,0 +1,133 @@
+"""A trained model: all that is needed to respond, and nothing that changes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from inphase.arrays import freeze
+from inphase.basis.layout import Layout
+from inphase.channels import Channel, Role
+from inphase.errors import OptionError
+from inphase.noise import Noise
+from inphase.phase import PhaseModel
+from inphase.preprocess.coordinates import Coordinates
+from inphase.preprocess.scaling import Scaling
+from inphase.weight_prior import WeightPrior
+
+if TYPE_CHECKING:
+    from inphase.session import Session
+
+
+@dataclass(frozen=True)
+class Model:
+    """How two partners move together, learned from demonstrations.
+
+    The data flow: channels (D) → `coordinates` → features (F) → `scaling` → `layout` → basis weights (B), believed to
+    be drawn from `prior`, read with `noise`, at a phase that moves by `phase`. spread: (D,) the standard deviation of
+    every channel over the demonstrations, in its unit. Raises OptionError where the parts do not fit each other.
+    """
+
+    channels: tuple[Channel, ...]
+    coordinates: Coordinates
+    scaling: Scaling
+    layout: Layout
+    prior: WeightPrior
+    noise: Noise
+    phase: PhaseModel
+    spread: Float[np.ndarray, " D"]
+    provenance: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "channels", tuple(self.channels))
+        object.__setattr__(self, "provenance", MappingProxyType(dict(self.provenance)))
+        freeze(self, spread=self.spread)
+        features, weights = self.coordinates.count, self.layout.size
+        for what, expected, got in (
+            ("channels of the coordinates", len(self.channels), len(self.coordinates.channels)),
+            ("features of the scaling", features, len(self.scaling.low)),
+            ("features of the basis layout", features, self.layout.count),
+            ("features of the noise", features, len(self.noise.var)),
+            ("weights of the prior", weights, self.prior.samples.shape[1]),
+            ("channels of the spread", len(self.channels), len(self.spread)),
+        ):
+            if expected != got:
+                raise OptionError(f"{what}: expected {expected}, got {got}")
+        if self.phase.periodic != self.layout.periodic:
+            raise OptionError(
+                f"expected phase and basis to be both periodic or both not, got phase.periodic={self.phase.periodic} "
+                f"and a basis with periodic={self.layout.periodic}"
+            )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of all channels: the observed ones, then the controlled."""
+        return tuple(channel.name for channel in self.channels)
+
+    @property
+    def observed(self) -> tuple[str, ...]:
+        """The names of the observed channels."""
+        return tuple(channel.name for channel in self.channels if channel.role is Role.OBSERVED)
+
+    @property
+    def controlled(self) -> tuple[str, ...]:
+        """The names of the controlled channels."""
+        return tuple(channel.name for channel in self.channels if channel.role is Role.CONTROLLED)
+
+    def predict(self, phases: ArrayLike, weights: ArrayLike | None = None) -> Float[np.ndarray, "P D"]:
+        """What the channels read at phases (P,): h(φ, w), for weights (B,), or those of the mean trajectory."""
+        at, w = self._phases(phases), self.prior.mean if weights is None else np.asarray(weights, dtype=np.float64)
+        if w.shape != (self.layout.size,):
+            raise OptionError(f"expected weights of shape ({self.layout.size},), got {w.shape}")
+        mean = self.layout.predict(at, w)
+        return self.to_channels(mean, np.zeros_like(mean))[0]
+
+    def distribution(self, phases: ArrayLike) -> tuple[Float[np.ndarray, "P D"], Float[np.ndarray, "P D"]]:
+        """Mean and standard deviation (P, D) of the channels over new interactions, at phases (P,)."""
+        at, everything = self._phases(phases), np.arange(self.layout.count)
+        var = np.array([(self.layout.project(float(p), self.prior.factor, everything) ** 2).sum(0) for p in at])
+        mean, var = self.to_channels(self.layout.predict(at, self.prior.mean), var + self.noise.var)
+        return mean, np.sqrt(var)
+
+    def to_channels(
+        self, mean: Float[np.ndarray, "S F"], var: Float[np.ndarray, "S F"]
+    ) -> tuple[Float[np.ndarray, "S D"], Float[np.ndarray, "S D"]]:
+        """Mean and variance of scaled features as mean and variance of the channels, in their units."""
+        return self.coordinates.to_channels(self.scaling.unscale(mean), self.scaling.unscale_var(var))
+
+    def _phases(self, phases: ArrayLike) -> Float[np.ndarray, " P"]:
+        at = np.atleast_1d(np.asarray(phases, dtype=np.float64))
+        if at.ndim != 1 or not np.isfinite(at).all():
+            raise OptionError(f"expected finite phases (P,), got shape {at.shape}")
+        return at
+
+    # The three doors upward (docs/decisions/0001-doors.md): what a user looks for on a model, wherever it lives.
+
+    def session(self, filter: str = "ebip", seed: int = 0, **options: Any) -> Session:
+        """A session that follows one interaction live; `options` are those of the filter.
+
+        Raises OptionError for an unknown filter or option.
+        """
+        from inphase.session import Session
+
+        return Session(self, filter, seed, **options)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the model to one file, whole or not at all."""
+        from inphase.io.model_file import write_model
+
+        write_model(self, path)
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Model:
+        """Read a model file; raises ModelFileError for anything that is not a whole one of a known version."""
+        from inphase.io.model_file import read_model
+
+        return read_model(path)

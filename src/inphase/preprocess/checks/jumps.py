@@ -1,0 +1,112 @@
+"""Jumps: further in one step than the channel could have moved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from inphase.channels import Channel, Kind
+from inphase.preprocess.checks.clock import GAP, median_step
+from inphase.preprocess.checks.finding import Finding, FindingKind, times_over
+from inphase.preprocess.checks.stillness import is_switch, spread_of
+from inphase.preprocess.checks.tracks import Track, group_spreads, tracks
+
+TAU = 2 * np.pi
+SHARE = 0.4  # of how far the group moves: a smaller step is no jump ...
+ROTATION = 1.0  # of how far a quaternion moves, this much counts: 0.4 of it is 46 degrees, too much for one step
+OUTLIER = 10.0  # ... nor is one below this many standard deviations (1.4826 MAD) of the channel's steps ...
+SUDDEN = 0.5  # ... nor one of which more than this share continues the step before it or leads into the one after
+TURN = 0.3  # [rad] a jump this close to a whole turn is one
+RADIANS = ("", "rad")  # units in which a channel may be an angle
+
+
+def check_jumps(
+    name: str,
+    times: Float[np.ndarray, " T"],
+    values: Float[np.ndarray, "T D"],
+    channels: Sequence[Channel],
+    usual: Mapping[str, float] | None = None,
+) -> list[Finding]:
+    """Jumps of the channels of an episode; whole turns of angles apart, quaternions by all four numbers.
+
+    `usual` is how far each group moves in the other episodes, where it is known (`usual_spreads`).
+    """
+    findings = []
+    found = tracks(values, channels)
+    spreads = group_spreads(found)
+    for track in found:
+        if all(is_switch(values[:, i]) for i in track.columns):
+            continue
+        # What hardly moves jumps within its noise; what counts is how far its group moves, here or in other episodes.
+        spread = max(spreads[track.group], (usual or {}).get(track.group, 0.0))
+        when = times[track.samples]
+        jumped = _sudden(when, track.path, spread if len(track.columns) == 1 else min(spread, ROTATION))
+        if len(track.columns) == 1:
+            channel = channels[track.columns[0]]
+            turned = _turned(channel, when, values[track.samples, track.columns[0]])
+            if turned.any():
+                findings.append(_turns(name, channel, when, turned))
+            jumped &= ~turned
+        findings += _jumped(name, track, when, spread, jumped)
+    return findings
+
+
+def _sudden(times: Float[np.ndarray, " N"], path: Float[np.ndarray, "N C"], spread: float) -> Bool[np.ndarray, " N-1"]:
+    """(N-1,) whether each step of the path is one that no smooth movement takes."""
+    if len(times) < 3:
+        return np.zeros(max(len(times) - 1, 0), dtype=bool)
+    stretch, gap = _stretch(times)
+    speeds = np.diff(path, axis=0) / stretch[:, None]
+    sizes = np.linalg.norm(speeds, axis=1)
+    # How much of the step is news to one who has seen the step before it, and to one who knows the step after it.
+    change = np.linalg.norm(np.diff(speeds, axis=0), axis=1)
+    news = np.minimum(np.concatenate([[np.inf], change]), np.concatenate([change, [np.inf]]))
+    usual = OUTLIER * 1.4826 * float(np.median(sizes))
+    return np.asarray((sizes > max(SHARE * spread, usual)) & (news > SUDDEN * sizes) & ~gap)
+
+
+def _stretch(times: Float[np.ndarray, " N"]) -> tuple[Float[np.ndarray, " N-1"], Bool[np.ndarray, " N-1"]]:
+    """(N-1,) how many median steps each step lasts, at least 1, and whether it is a gap."""
+    with np.errstate(invalid="ignore"):
+        lasts = np.diff(times) / median_step(times)
+    lasts = np.where(np.isfinite(lasts), np.maximum(lasts, 1.0), 1.0)
+    return lasts, np.asarray(lasts > GAP)
+
+
+def _turned(
+    channel: Channel, times: Float[np.ndarray, " N"], path: Float[np.ndarray, " N"]
+) -> Bool[np.ndarray, " N-1"]:
+    """(N-1,) whether each step is a whole turn and no movement."""
+    steps = np.diff(path)
+    if channel.kind is Kind.ANGLE:
+        return np.asarray(np.abs(steps) > np.pi)
+    if channel.unit not in RADIANS:
+        return np.zeros(len(steps), dtype=bool)
+    turns = np.round(steps / TAU)
+    return np.asarray(
+        (turns != 0) & (np.abs(steps - TAU * turns) < TURN) & _sudden(times, path[:, None], spread_of(path))
+    )
+
+
+def _turns(name: str, channel: Channel, times: Float[np.ndarray, " N"], turned: Bool[np.ndarray, " N-1"]) -> Finding:
+    at = np.flatnonzero(turned) + 1
+    cure = "it is unwrapped" if channel.kind is Kind.ANGLE else f"kinds={{{channel.name!r}: 'angle'}} unwraps it"
+    message = f"jumps by a whole turn (2π) {times_over(len(at))}, first at {times[at[0]]:g} s; {cure}"
+    return Finding(name, channel.name, float(times[at[0]]), FindingKind.BRANCH, message)
+
+
+def _jumped(
+    name: str, track: Track, times: Float[np.ndarray, " N"], spread: float, jumped: Bool[np.ndarray, " N-1"]
+) -> list[Finding]:
+    at = np.flatnonzero(jumped) + 1
+    if not len(at):
+        return []
+    sizes = np.linalg.norm(track.path[at] - track.path[at - 1], axis=1)
+    largest = int(np.argmax(sizes))
+    message = (
+        f"jumps {times_over(len(at))}, furthest by {sizes[largest]:.3g} at {times[at[largest]]:g} s; "
+        f"all of its movement spans {spread:.3g}"
+    )
+    return [Finding(name, track.name, float(times[at[0]]), FindingKind.JUMP, message)]

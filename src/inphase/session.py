@@ -1,0 +1,199 @@
+"""A live interaction: samples go in one at a time, estimates and responses come out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from inphase.channels import match
+from inphase.errors import ObservationError, OptionError, listing
+from inphase.filters import Belief, Course, StepInfo, make
+from inphase.model import Model
+from inphase.observation import Observation
+from inphase.result import Estimate, Response, Status
+
+BLIND_AFTER = 0.1  # of a typical interaction with nothing seen, and the estimate is called blind
+UNLIKE_ABOVE = 9.0  # surprise a reading, averaged: as if every reading lay three standard deviations off
+UNLIKE_WITHIN = 0.05  # of a typical interaction, the time constant of that average
+FINISHED_AT = 0.999
+SLOWEST = 0.05  # of the typical tempo: a response to a partner who stands still must end some time
+
+
+class Session:
+    """One interaction, followed live: `observe` every sample, `respond` whenever a response is wanted.
+
+    Time is an argument and randomness comes from the seed, so that the same samples give the same answers, bit for
+    bit. Mistakes raise; trouble is told by the status of the estimate.
+    """
+
+    def __init__(self, model: Model, filter: str = "ebip", seed: int = 0, **options: Any) -> None:
+        self.model = model
+        self._filter = make(filter, model, **options)
+        self._index = {name: i for i, name in enumerate(model.names)}
+        self._typical_duration = 1.0 / model.phase.nominal_velocity
+        self.reset(seed)
+
+    def reset(self, seed: int | None = None) -> None:
+        """Begin a new interaction, with a new seed or the same again."""
+        self._seed = self._seed if seed is None else seed
+        self._rng = np.random.default_rng(self._seed)
+        self._belief: Belief = self._filter.init(self._rng)
+        self._time: float | None = None
+        self._last_seen = np.full(self.model.coordinates.count, -np.inf)
+        self._last_sight: float | None = None
+        self._surprise = 1.0
+
+    @property
+    def belief(self) -> Belief:
+        """The distribution over phase and weights after the last sample."""
+        return self._belief
+
+    @property
+    def time(self) -> float | None:
+        """The time of the last sample [s]; None before the first."""
+        return self._time
+
+    def observe(self, time: float, values: ArrayLike | Mapping[str, float]) -> Estimate:
+        """Take in one sample and say where the interaction is.
+
+        time: [s], never earlier than the last. values: the observed channels in their order, or {name: value} of any
+        channels, controlled ones too; what is NaN, infinite or left out was not seen, and a sample in which nothing
+        was seen is a prediction alone. Raises ObservationError for a time that runs backwards, a wrong number of
+        values or an unknown name.
+        """
+        time = float(time)
+        if not np.isfinite(time) or (self._time is not None and time < self._time):
+            expected = "a finite time" if self._time is None else f"a time of at least {self._time:g} s"
+            raise ObservationError(f"expected {expected}, got {time:g} s; reset() begins a new interaction")
+        sample = self._sample(values)
+        dt = 0.0 if self._time is None else time - self._time
+        observation = self._observation(sample, time, dt)
+        belief, info = self._filter.step(self._belief, observation, dt, self._rng)
+        self._belief, self._time = belief, time
+        self._last_seen[observation.features] = time
+        if self._last_sight is None or len(observation):
+            self._last_sight = time
+        return self._estimate(observation, info, dt)
+
+    def respond(
+        self,
+        lookahead: float = 0.0,
+        samples: int = 50,
+        *,
+        start: float | None = None,
+        channels: Sequence[str] | str | None = None,
+    ) -> Response:
+        """What the controlled channels should read from now to the end of the interaction.
+
+        lookahead: begin that much phase later than the estimate (4.2.8.3). start: begin at that phase instead
+        (4.2.8.2). samples: how many, evenly spaced in phase; 1 is the first alone. channels: names or patterns of
+        others to tell of, the partner's included. A periodic interaction is answered for one cycle. `std` is that of
+        a reading: doubt about phase and weights, and the observation noise. Raises OptionError, ChannelError.
+        """
+        course = self._course(lookahead, start, samples)
+        model = self.model
+        columns = match(model.controlled if channels is None else channels, model.names)
+        features = model.coordinates.features_of(columns)
+        mean, var = np.zeros((samples, model.coordinates.count)), np.zeros((samples, model.coordinates.count))
+        mean[:, features], var[:, features] = self._belief.trajectory(course, features)
+        var[:, features] += model.noise.var[features]
+        mean, var = model.to_channels(mean, var)
+        phase, velocity = self._belief.phase_mean[0], self._velocity()[0]
+        phases = course.share * phase + course.offset
+        phases = phases if model.phase.periodic else np.clip(phases, 0.0, 1.0)
+        duration = (phases - phase) / max(velocity, SLOWEST * model.phase.nominal_velocity)
+        return Response(
+            times=(self._time or 0.0) + duration,
+            phases=phases % 1.0 if model.phase.periodic else phases,
+            mean=mean[:, columns],
+            std=np.sqrt(var[:, columns]),
+            channels=tuple(model.names[i] for i in columns),
+        )
+
+    def _sample(self, values: ArrayLike | Mapping[str, float]) -> Float[np.ndarray, " D"]:
+        """All channels, NaN where not seen."""
+        sample = np.full(len(self.model.channels), np.nan)
+        if isinstance(values, Mapping):
+            for name, value in values.items():
+                if name not in self._index:
+                    raise ObservationError(f"unknown channel {name!r}; the channels are {listing(self._index)}")
+                sample[self._index[name]] = value
+        else:
+            observed = self.model.observed
+            array = np.asarray(values, dtype=np.float64)
+            if array.shape != (len(observed),):
+                raise ObservationError(
+                    f"expected {len(observed)} values, one for each of {listing(observed)}, got shape {array.shape}"
+                )
+            sample[: len(observed)] = array
+        sample[np.isinf(sample)] = np.nan
+        return sample
+
+    def _observation(self, sample: Float[np.ndarray, " D"], time: float, dt: float) -> Observation:
+        model = self.model
+        if model.coordinates.flat:
+            values = sample
+        else:
+            # Angles and rotations are read on the branch that lies nearest to what is expected of them.
+            mean = self._belief.phase_mean
+            phase = model.phase.confine((model.phase.transition(dt) @ mean)[:1])
+            near = model.scaling.unscale(model.layout.predict(phase, self._belief.weights_mean)[0])
+            values = model.coordinates.sample(sample, near)
+        noise_var = model.noise.at(time - self._last_seen)
+        seen = np.flatnonzero(np.isfinite(values) & np.isfinite(noise_var))
+        return Observation(seen, model.scaling.scale(values)[seen], noise_var[seen])
+
+    def _course(self, lookahead: float, start: float | None, samples: int) -> Course:
+        if not (isinstance(samples, (int, np.integer)) and samples >= 1):
+            raise OptionError(f"expected samples to be a whole number of at least 1, got {samples!r}")
+        if not 0 <= lookahead <= 1:
+            raise OptionError(f"expected a lookahead of phase between 0 and 1, got {lookahead}")
+        if start is not None and not 0 <= start <= 1:
+            raise OptionError(f"expected a start phase between 0 and 1, got {start}")
+        if start is not None and lookahead != 0:
+            raise OptionError(f"give either start or lookahead, got start={start} and lookahead={lookahead}")
+        steps = np.linspace(0.0, 1.0, samples)
+        if self.model.phase.periodic:
+            return Course(np.full(samples, float(start is None)), (start or lookahead) + steps)
+        if start is not None:
+            return Course(np.zeros(samples), start + (1 - start) * steps)
+        return Course(1 - steps, (1 - steps) * lookahead + steps)
+
+    def _velocity(self) -> tuple[float, float]:
+        """Tempo and its standard deviation [1/s]; a phase model without one has that of the demonstrations."""
+        mean, cov = self._belief.phase_mean, self._belief.phase_cov
+        if len(mean) == 1:
+            return self.model.phase.nominal_velocity, 0.0
+        return float(mean[1]), float(np.sqrt(max(cov[1, 1], 0.0)))
+
+    def _estimate(self, observation: Observation, info: StepInfo, dt: float) -> Estimate:
+        model, belief = self.model, self._belief
+        phase, var = float(belief.phase_mean[0]), float(belief.phase_cov[0, 0])
+        velocity, velocity_std = self._velocity()
+        if len(observation) and info.healthy:
+            keep = np.exp(-dt / (UNLIKE_WITHIN * self._typical_duration))
+            self._surprise = keep * self._surprise + (1 - keep) * info.surprise / len(observation)
+        span = model.scaling.span[observation.features]
+        return Estimate(
+            time=self._time or 0.0,
+            phase=phase % 1.0 if model.phase.periodic else phase,
+            phase_std=float(np.sqrt(max(var, 0.0))),
+            phase_velocity=velocity,
+            phase_velocity_std=velocity_std,
+            log_likelihood=info.log_likelihood - float(np.log(span).sum()) if len(observation) else 0.0,
+            status=self._status(observation, info, phase),
+        )
+
+    def _status(self, observation: Observation, info: StepInfo, phase: float) -> Status:
+        if not info.healthy:
+            return Status.COLLAPSED
+        if len(observation) == 0:
+            unseen = (self._time or 0.0) - (self._last_sight or 0.0)
+            return Status.BLIND if unseen > BLIND_AFTER * self._typical_duration else Status.NOTHING_SEEN
+        if self._surprise > UNLIKE_ABOVE:
+            return Status.UNLIKE
+        return Status.FINISHED if not self.model.phase.periodic and phase >= FINISHED_AT else Status.FOLLOWING

@@ -1,0 +1,96 @@
+"""From demonstrations to a model, nothing set by hand (2.3.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from inphase.basis import Basis, Gaussian, Layout, Periodic
+from inphase.basis.fit import fit_weights, residuals
+from inphase.channels import spread
+from inphase.errors import DataError, OptionError, listing
+from inphase.model import Model
+from inphase.noise import Noise
+from inphase.phase import PhaseModel
+from inphase.preprocess.coordinates import Coordinates
+from inphase.preprocess.scaling import Scaling
+from inphase.training.noise import learn_noise
+from inphase.training.tempo import learn_phase
+from inphase.trajectory import Dataset
+from inphase.weight_prior import WeightPrior
+
+DEFAULT_SIZE = 12  # basis functions a channel
+
+
+def fit(
+    dataset: Dataset,
+    *,
+    basis: Basis | Mapping[str, Basis] | None = None,
+    scaling: Scaling | None = None,
+    prior: WeightPrior | None = None,
+    noise: Noise | None = None,
+    phase: PhaseModel | None = None,
+) -> Model:
+    """Learn how two partners move together.
+
+    Everything is learned from the data set but what is named: a basis for all channels or by channel name or pattern
+    (what is left out keeps the default), the scaling of the features, the prior over weights, the observation noise
+    in scaled units, the phase prior (`inphase.learn_phase` makes one of another order, or periodic).
+    Raises DataError for fewer than two demonstrations, no controlled channel, or a channel that never moves;
+    ChannelError for a pattern that fits nothing; OptionError for parts that do not fit each other.
+    """
+    _check(dataset)
+    phase = phase if phase is not None else learn_phase(dataset)
+    values = [demonstration.values for demonstration in dataset]
+    coordinates = Coordinates.learn(dataset.channels, values)
+    features = [coordinates.from_channels(v) for v in values]
+    scaling = scaling if scaling is not None else Scaling.learn(coordinates.groups, features)
+    layout = Layout(_bases(basis, dataset, coordinates, phase.periodic))
+    scaled = [scaling.scale(f) for f in features]
+    times, phases = [d.times for d in dataset], [d.phases for d in dataset]
+    if len(scaling.low) != coordinates.count:
+        raise OptionError(f"scaling: expected {coordinates.count} features, got {len(scaling.low)}")
+    weights, _ = fit_weights(layout, phases, scaled, names=coordinates.names)
+    return Model(
+        channels=dataset.channels,
+        coordinates=coordinates,
+        scaling=scaling,
+        layout=layout,
+        prior=prior if prior is not None else WeightPrior(weights),
+        noise=noise if noise is not None else learn_noise(times, residuals(layout, phases, scaled, weights)),
+        phase=phase,
+        spread=np.nanstd(np.concatenate(values), axis=0),
+        provenance={**dataset.provenance, "demonstrations": str(len(dataset))},
+    )
+
+
+def _check(dataset: Dataset) -> None:
+    if len(dataset) < 2:
+        raise DataError(f"expected at least 2 demonstrations to learn from, got 1 ({dataset[0].name})")
+    for role, names in (("observed", dataset.observed), ("controlled", dataset.controlled)):
+        if not names:
+            raise DataError(f"expected at least one {role} channel, got none; the channels are {listing(dataset.names)}")
+    everything = np.concatenate([demonstration.values for demonstration in dataset])
+    for name, column in zip(dataset.names, everything.T, strict=True):
+        seen = column[np.isfinite(column)]
+        if len(seen) == 0:
+            raise DataError(f"channel {name!r}: expected readings, got none in any of {len(dataset)} demonstrations")
+        if np.ptp(seen) <= 1e-12 * np.abs(seen).max():
+            raise DataError(
+                f"channel {name!r}: expected a channel that moves, got {seen[0]:g} in every sample of all "
+                f"{len(dataset)} demonstrations; leave it out"
+            )
+
+
+def _bases(
+    basis: Basis | Mapping[str, Basis] | None, dataset: Dataset, coordinates: Coordinates, periodic: bool
+) -> tuple[Basis, ...]:
+    """One basis a feature; that of a feature is the one of its (first) channel."""
+    default: Basis = Periodic(DEFAULT_SIZE) if periodic else Gaussian(DEFAULT_SIZE)
+    if basis is None:
+        basis = default
+    if not isinstance(basis, Mapping):
+        return (basis,) * coordinates.count
+    by_channel = spread(basis, dataset.names)
+    return tuple(by_channel.get(dataset.names[positions[0]], default) for positions in coordinates.channel_of)

@@ -1,0 +1,66 @@
+"""What is believed of the basis weights before a partner is seen (Eq. 2.11, 2.14)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from inphase.arrays import freeze, frozen
+from inphase.errors import OptionError
+
+
+@dataclass(frozen=True)
+class WeightPrior:
+    """The demonstrations' weights, and the Gaussian made of them.
+
+    samples: (N, B) one row a demonstration. shrinkage: 0 … 1, how much of the covariance between weights is taken for
+    chance; the variances stay. Raises OptionError for fewer than two demonstrations or a shrinkage outside 0 … 1.
+    """
+
+    samples: Float[np.ndarray, "N B"]
+    shrinkage: float = 0.0
+
+    def __post_init__(self) -> None:
+        freeze(self, samples=self.samples)
+        if self.samples.ndim != 2 or len(self.samples) < 2 or not np.isfinite(self.samples).all():
+            raise OptionError(f"expected finite weights (N, B) of at least 2 demonstrations, got {self.samples.shape}")
+        if not 0 <= self.shrinkage <= 1:
+            raise OptionError(f"expected a shrinkage between 0 and 1, got {self.shrinkage}")
+
+    @cached_property
+    def mean(self) -> Float[np.ndarray, " B"]:
+        """(B,) w₀, the mean of the demonstrations (Eq. 2.11)."""
+        return frozen(self.samples.mean(0))
+
+    @cached_property
+    def factor(self) -> Float[np.ndarray, "R B"]:
+        """(R, B) directions with Σ_ww = factorᵀ factor (Eq. 2.14): a weight vector is mean + c @ factor, c ~ N(0, I).
+
+        Without shrinkage R < N: the exact filters then work in as few dimensions as there are demonstrations.
+        """
+        spread = (self.samples - self.mean) / np.sqrt(len(self.samples) - 1)
+        rows = [np.sqrt(1 - self.shrinkage) * spread] if self.shrinkage < 1 else []
+        if self.shrinkage > 0:
+            rows.append(np.diag(np.sqrt(self.shrinkage * (spread**2).sum(0))))
+        # The directions of the sample covariance sum to zero and are one too many: rotate that one away.
+        _, size, directions = np.linalg.svd(np.concatenate(rows), full_matrices=False)
+        kept = size > 1e-10 * max(size[0], np.finfo(float).tiny)
+        return frozen(size[kept, None] * directions[kept])
+
+    @property
+    def cov(self) -> Float[np.ndarray, "B B"]:
+        """(B, B) Σ_ww of Eq. 2.14, made anew at each call."""
+        return np.asarray(self.factor.T @ self.factor)
+
+    def draw(self, count: int, rng: np.random.Generator) -> Float[np.ndarray, "E B"]:
+        """`count` weight vectors from the Gaussian."""
+        return np.asarray(self.mean + rng.standard_normal((count, len(self.factor))) @ self.factor)
+
+    def resample(self, count: int, rng: np.random.Generator) -> Float[np.ndarray, "E B"]:
+        """`count` of the demonstrations' own weights, each as often as any other, give or take one (Fig. 23)."""
+        number = len(self.samples)
+        order = np.concatenate([np.tile(np.arange(number), count // number), rng.permutation(number)[: count % number]])
+        return np.asarray(self.samples[order])
