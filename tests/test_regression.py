@@ -38,11 +38,11 @@ def plain_ridge(functions: np.ndarray, readings: np.ndarray, ridge: float, towar
     return np.linalg.lstsq(matrix, np.concatenate([readings, below * toward]), rcond=None)[0]
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(SEEDS, st.sampled_from([1e-6, 1e-3]), st.sampled_from([0.0, 0.2]))
 def test_both_stages_are_plain_least_squares(seed: int, ridge: float, missing: float) -> None:
     phases, values = demonstrations(MIXED, np.random.default_rng(seed), missing=missing)
-    own, pooled = fit_weights(MIXED, phases, values, ridge)
+    own, pooled = fit_weights(MIXED, phases, values, ridge, bridge=0.0)
     for feature, basis in enumerate(MIXED.bases):
         seen = [~np.isnan(v[:, feature]) for v in values]
         at = [basis(p[mask]) for p, mask in zip(phases, seen, strict=True)]
@@ -54,7 +54,7 @@ def test_both_stages_are_plain_least_squares(seed: int, ridge: float, missing: f
             np.testing.assert_allclose(own[n, MIXED.slices[feature]], expected, atol=1e-6)
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(SEEDS)
 def test_a_missing_reading_is_as_good_as_none(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -109,11 +109,11 @@ def test_every_reading_twice_says_nothing_new(rng: np.random.Generator) -> None:
 def test_known_weights_are_recovered(basis: Basis, rng: np.random.Generator) -> None:
     layout = Layout((basis,) * 2)
     truth = rng.normal(size=(4, layout.size))
-    phases = [np.sort(rng.random(length)) for length in (400, 500, 350, 600)]
+    phases = [np.sort(rng.random(500))] * 4
     values = [layout.predict(p, w) for p, w in zip(phases, truth, strict=True)]
     own, pooled = fit_weights(layout, phases, values, 1e-11)
     np.testing.assert_allclose(own, truth, atol=1e-3)
-    np.testing.assert_allclose(pooled, truth.mean(0), atol=1.0)
+    np.testing.assert_allclose(pooled, truth.mean(0), atol=1e-3)
     for residual in residuals(layout, phases, values, own):
         np.testing.assert_allclose(residual, 0.0, atol=1e-7)
 
@@ -158,7 +158,9 @@ def test_where_nobody_was_seen_a_feature_keeps_its_level(rng: np.random.Generato
 
 
 def test_without_gaps_the_bridge_bears_nothing(rng: np.random.Generator) -> None:
-    phases, values = demonstrations(MIXED, rng, missing=0.3)
+    phases, values = demonstrations(MIXED, rng)
+    for v in values:
+        v[2::3] = np.nan  # one camera frame in three
     for with_bridge, without in zip(
         fit_weights(MIXED, phases, values, bridge=100.0), fit_weights(MIXED, phases, values, bridge=0.0), strict=True
     ):
@@ -230,9 +232,7 @@ def test_arrays_that_do_not_fit_are_refused(rng: np.random.Generator) -> None:
     with pytest.raises(DataError, match=r"demonstration 0: expected values \(\d+, 2\), got"):
         fit_weights(Layout((Gaussian(4),) * 2), phases, values)
     with pytest.raises(DataError, match="demonstration 2: expected finite phases"):
-        fit_weights(
-            MIXED, phases, [values[0], values[1], values[2] / 0.0 if False else np.full_like(values[2], np.inf)]
-        )
+        fit_weights(MIXED, phases, [values[0], values[1], np.full_like(values[2], np.inf)])
     with pytest.raises(DataError, match="weights of 3 demonstrations, got 2"):
         residuals(MIXED, phases, values, np.zeros((2, MIXED.size)))
     for ridge, bridge in [(0.0, 0.1), (-1.0, 0.1), (math.nan, 0.1), (1e-6, -0.1), (1e-6, math.nan)]:

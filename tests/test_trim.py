@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
+from inphase.channels import match
 from inphase.errors import ChannelError, OptionError
 from inphase.preprocess.trim import trim
 from inphase.trajectory import Dataset
@@ -41,7 +42,7 @@ def dataset(episodes):
     )
 
 
-@settings(max_examples=40)
+@settings(max_examples=30)
 @given(
     st.integers(0, 2**32 - 1),
     st.floats(0.5, 3.0),
@@ -51,11 +52,12 @@ def dataset(episodes):
 )
 def test_the_planted_movement_is_found_through_noise_and_gaps(seed, before, moving, after, rate):
     rng = np.random.default_rng(seed)
-    recorded = dataset([episode(rng, before, before + moving, before + moving + after, rate) for _ in range(3)])
+    recorded = dataset([episode(rng, before, before + moving, before + moving + after, rate) for _ in range(2)])
     for was, now in zip(recorded, trim(recorded, margin=MARGIN), strict=True):
         # The slowest beginnings of a reach cannot be told from standing, and a slope needs some time to be seen.
-        assert now.times[0] + MARGIN == pytest.approx(before, abs=0.1 + 0.05 * moving)
-        assert now.times[-1] - MARGIN == pytest.approx(before + moving, abs=0.1 + 0.05 * moving)
+        tolerance = 0.1 + 0.05 * moving + 2 / rate
+        assert now.times[0] + MARGIN == pytest.approx(before, abs=tolerance)
+        assert now.times[-1] - MARGIN == pytest.approx(before + moving, abs=tolerance)
         kept = np.isin(was.times, now.times)
         assert_array_equal(was.times[kept], now.times)
         assert_array_equal(was.values[kept], now.values)
@@ -95,7 +97,7 @@ def test_every_one_of_many_equal_movements_is_kept(rng):
     nods = sum(minimum_jerk(times, at, at + 0.7) * (-1) ** i for i, at in enumerate(np.arange(2.0, 47.0, 1.5)))
     trimmed = trim(dataset([(times, nods[:, None] * np.ones(4))]))[0]
     assert trimmed.times[0] == pytest.approx(2.0 - MARGIN, abs=0.1)
-    assert trimmed.times[-1] == pytest.approx(45.5 + 1.5 + 0.7 - 1.5 + MARGIN, abs=0.1)
+    assert trimmed.times[-1] == pytest.approx(45.5 + 0.7 + MARGIN, abs=0.1)
 
 
 def test_units_and_order_do_not_matter(rng):
@@ -119,9 +121,9 @@ def test_an_axis_that_hardly_moves_does_not_lend_its_noise(rng):
 
 def test_only_the_channels_that_are_named_tell(rng):
     times = np.arange(0.0, 6.0, 1 / 60)
-    early, late = minimum_jerk(times, 1.0, 2.0), minimum_jerk(times, 3.0, 4.5)
+    early, late = minimum_jerk(times, 1.0, 2.5), minimum_jerk(times, 3.0, 4.5)
     recorded = dataset([(times, np.column_stack([early, early, late, late]))])
-    for channels, onset, offset in ((None, 1.0, 4.5), (["a_x"], 1.0, 2.0), (["b_?"], 3.0, 4.5)):
+    for channels, onset, offset in ((None, 1.0, 4.5), (["a_x"], 1.0, 2.5), (["b_?"], 3.0, 4.5)):
         trimmed = trim(recorded, channels=channels)[0]
         assert trimmed.times[0] == pytest.approx(onset - MARGIN, abs=0.1)
         assert trimmed.times[-1] == pytest.approx(offset + MARGIN, abs=0.1)
@@ -169,8 +171,7 @@ def test_provenance_and_channels_stay_and_mistakes_are_named(rng):
         trim(recorded, channels=["c_x"])
 
 
-def test_people_who_wait_for_a_handover_are_cut_before_they_move(shared_data):
-    """The first part of each episode, by eye: nobody has gone further than a hand's breadth."""
+def test_people_who_wait_for_a_handover_are_cut_until_they_move(shared_data):
     times, values, names = [], [], []
     for path in sorted((shared_data / "handover").glob("*.csv"))[::6]:
         with path.open() as file:
@@ -179,13 +180,16 @@ def test_people_who_wait_for_a_handover_are_cut_before_they_move(shared_data):
         times.append(table[:, 0])
         values.append(table[:, 1:])
     recorded = Dataset.from_arrays(times, values, names[:7], names[7:])
-    positions = [i for i, name in enumerate(names) if name[-2:] in ("_x", "_y", "_z")]
-    cut = []
-    for was, now in zip(recorded, trim(recorded), strict=True):
+    axes = ["*_x", "*_y", "*_z"]
+    positions = match(axes, names)
+    cut, reached = [], []
+    for was, now in zip(recorded, trim(recorded, channels=axes), strict=True):
         waiting = was.values[was.times < now.times[0]][:, positions]
-        cut.append(now.times[0] - was.times[0])
         if len(waiting):
-            assert np.ptp(waiting, axis=0).max() < 0.1  # [m]
-        moved = now.values[-1, positions] - now.values[0, positions]
-        assert np.abs(moved).max() > 0.2  # [m]
-    assert np.median(cut) > 0.5
+            assert np.ptp(waiting, axis=0).max() < 0.08  # [m] a hand's breadth
+        gone = np.abs(now.values[:, positions] - now.values[0, positions]).max(axis=1)
+        cut.append(now.times[0] - was.times[0])
+        reached.append(now.times[gone > 0.05][0] - now.times[0])
+    # They wait for more than a second, and are on their way within half a second of the new start.
+    assert np.median(cut) > 1.0
+    assert np.median(reached) < 0.6

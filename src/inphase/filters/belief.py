@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -24,6 +24,7 @@ class Course:
     offset: Float[np.ndarray, " S"]
 
 
+@runtime_checkable
 class Belief(Protocol):
     """A distribution over the state [φ, φ̇, …, w]."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -25,6 +25,7 @@ class StepInfo:
     healthy: bool = True
 
 
+@runtime_checkable
 class Filter(Protocol):
     """Inference of phase and weights; immutable, so that one may serve many sessions."""
 
