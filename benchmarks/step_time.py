@@ -72,7 +72,10 @@ def main() -> None:
     matrix = rng.standard_normal((200, 200))
     yardstick = 1e3 * float(np.median(durations(lambda i: matrix @ matrix, 200)))
     print(f"yardstick, a 200 x 200 product: {yardstick:.3f} ms")
-    print(f"{'channels x basis, demonstrations':34s} {'filter':6s} {'observe':>9s} {'p99':>9s} {'respond':>9s} {'p99':>9s}  ratio")
+    print(
+        f"{'channels x basis, demonstrations':34s} {'filter':6s} {'observe':>9s} {'p99':>9s}"
+        f" {'respond':>9s} {'p99':>9s}  ratio"
+    )
     rows = []
     for channels, size, demonstrations in QUICK if options.quick else SIZES:
         model = make_model(channels, size, demonstrations, rng)

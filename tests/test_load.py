@@ -171,7 +171,7 @@ def test_csv_of_another_delimiter(write: Write) -> None:
 
 
 @settings(max_examples=60)
-@given(cut=st.integers(0, len(GOOD)), noise=st.text(max_size=3))
+@given(cut=st.integers(0, len(GOOD)), noise=st.text(',;"\n\r\0 1e-é\ud800', max_size=3))
 def test_damaged_csv_is_a_table_or_a_data_error(tmp_path_factory: pytest.TempPathFactory, cut: int, noise: str) -> None:
     path = tmp_path_factory.mktemp("csv") / "episode.csv"
     path.write_bytes((GOOD[:cut] + noise + GOOD[cut:]).encode(errors="surrogatepass"))

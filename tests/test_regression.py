@@ -54,6 +54,32 @@ def test_both_stages_are_plain_least_squares(seed: int, ridge: float, missing: f
             np.testing.assert_allclose(own[n, MIXED.slices[feature]], expected, atol=1e-6)
 
 
+def test_a_bridge_is_a_weak_reading_at_every_hundredth_of_the_gap(rng: np.random.Generator) -> None:
+    basis, bridge, ridge = Gaussian(12), 0.3, 1e-5
+    layout = Layout((basis,))
+    phases, values = demonstrations(layout, rng)
+    hidden = [(p > 0.2) & (p < 0.5) & (n < 2 or p < 0.4) for n, p in enumerate(phases)]
+    at = [p[~h] for p, h in zip(phases, hidden, strict=True)]
+    read = [v[~h] for v, h in zip(values, hidden, strict=True)]
+    own, pooled = fit_weights(layout, at, read, ridge, bridge=bridge)
+
+    def plain(p: np.ndarray, v: np.ndarray, toward: np.ndarray, level: np.ndarray, gap: np.ndarray) -> np.ndarray:
+        weight = math.sqrt(bridge * len(p) / 100)
+        below = math.sqrt(ridge * len(p))
+        matrix = np.concatenate([basis(p), weight * basis(gap), below * np.eye(12)])
+        goal = np.concatenate([v, weight * level, below * toward])
+        return np.linalg.lstsq(matrix, goal, rcond=None)[0]
+
+    together, gap = np.concatenate(at), np.arange(0.205, 0.4, 0.01)
+    gap = gap[[np.abs(together - g).min() > 0.02 for g in gap]]
+    level = np.full(len(gap), np.concatenate(read).mean())
+    mean = plain(together, np.concatenate(read)[:, 0], np.zeros(12), level, gap)
+    np.testing.assert_allclose(pooled, mean, atol=1e-6)
+    gap = np.arange(0.205, 0.5, 0.01)
+    gap = gap[[np.abs(at[0] - g).min() > 0.02 for g in gap]]
+    np.testing.assert_allclose(own[0], plain(at[0], read[0][:, 0], mean, basis(gap) @ mean, gap), atol=1e-6)
+
+
 @settings(max_examples=10)
 @given(SEEDS)
 def test_a_missing_reading_is_as_good_as_none(seed: int) -> None:

@@ -53,7 +53,9 @@ class PhaseModel:
     def transition(self, dt: float) -> Float[np.ndarray, "K K"]:
         """The phase block of G in Eq. 2.4, dt [s] later: a Taylor step."""
         size = len(self.mean)
-        return np.array([[dt ** (j - i) / factorial(j - i) if j >= i else 0.0 for j in range(size)] for i in range(size)])
+        return np.array(
+            [[dt ** (j - i) / factorial(j - i) if j >= i else 0.0 for j in range(size)] for i in range(size)]
+        )
 
     def process_cov(self, dt: float) -> Float[np.ndarray, "K K"]:
         """The phase block of Q in Eq. 2.5, dt [s] later.
@@ -67,7 +69,9 @@ class PhaseModel:
         return np.array(
             [
                 [
-                    self.diffusion * dt ** (2 * n - i - j + 1) / (factorial(n - i) * factorial(n - j) * (2 * n - i - j + 1))
+                    self.diffusion
+                    * dt ** (2 * n - i - j + 1)
+                    / (factorial(n - i) * factorial(n - j) * (2 * n - i - j + 1))
                     for j in range(n + 1)
                 ]
                 for i in range(n + 1)
@@ -79,4 +83,4 @@ class PhaseModel:
 
         Turning all of them by the same whole number keeps the spread of an ensemble that straddles 1 whole.
         """
-        return phases - np.floor(phases.mean()) if self.periodic else np.clip(phases, 0.0, 1.0)
+        return np.asarray(phases - np.floor(phases.mean()) if self.periodic else np.clip(phases, 0.0, 1.0))

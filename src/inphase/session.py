@@ -33,9 +33,10 @@ class Session:
     def __init__(self, model: Model, filter: str = "ebip", seed: int = 0, **options: Any) -> None:
         self.model = model
         self._filter = make(filter, model, **options)
+        self._seed = seed
         self._index = {name: i for i, name in enumerate(model.names)}
         self._typical_duration = 1.0 / model.phase.nominal_velocity
-        self.reset(seed)
+        self.reset()
 
     def reset(self, seed: int | None = None) -> None:
         """Begin a new interaction, with a new seed or the same again."""

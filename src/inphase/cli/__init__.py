@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from inphase.errors import InphaseError
 
@@ -20,9 +20,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from inphase.cli.replay import replay
     from inphase.cli.validate import validate
 
-    commands = {"demo": demo, "validate": validate, "fit": fit, "inspect": inspect, "replay": replay}
+    commands: dict[str, Callable[..., int]] = {
+        "demo": demo,
+        "validate": validate,
+        "fit": fit,
+        "inspect": inspect,
+        "replay": replay,
+    }
     try:
-        code = tyro.extras.subcommand_cli_from_dict(
+        code: int = tyro.extras.subcommand_cli_from_dict(
             commands,
             prog="inphase",
             description="Learn from recordings how two partners move together, then move with one of them live.",
@@ -37,4 +43,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has gone, as `head` does
         sys.stderr.close()
         return 0
-    return int(code or 0)
+    return code

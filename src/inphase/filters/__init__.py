@@ -14,10 +14,21 @@ from inphase.model import Model
 
 FILTERS: dict[str, type[Bip] | type[Ebip]] = {"bip": Bip, "ebip": Ebip}
 
-__all__ = ["FILTERS", "Belief", "Bip", "Course", "Ebip", "EnsembleBelief", "Filter", "GaussianBelief", "StepInfo", "make"]
+__all__ = [
+    "FILTERS",
+    "Belief",
+    "Bip",
+    "Course",
+    "Ebip",
+    "EnsembleBelief",
+    "Filter",
+    "GaussianBelief",
+    "StepInfo",
+    "make",
+]
 
 
-def make(name: str, model: Model, **options: Any) -> Filter:
+def make(name: str, model: Model, **options: Any) -> Filter[Any]:
     """The filter of that name for a model; `options` are the fields of its class.
 
     Raises OptionError for an unknown filter, or an option it does not have.

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
 from inphase.filters.belief import Belief
 from inphase.observation import Observation
+
+B = TypeVar("B", bound=Belief)
 
 
 @dataclass(frozen=True)
@@ -26,16 +28,14 @@ class StepInfo:
 
 
 @runtime_checkable
-class Filter(Protocol):
+class Filter(Protocol[B]):
     """Inference of phase and weights; immutable, so that one may serve many sessions."""
 
-    def init(self, rng: np.random.Generator) -> Belief:
+    def init(self, rng: np.random.Generator) -> B:
         """The belief before anything is seen."""
 
-    def predict(self, belief: Belief, dt: float, rng: np.random.Generator) -> Belief:
+    def predict(self, belief: B, dt: float, rng: np.random.Generator) -> B:
         """The belief dt [s] later, nothing seen."""
 
-    def step(
-        self, belief: Belief, observation: Observation, dt: float, rng: np.random.Generator
-    ) -> tuple[Belief, StepInfo]:
+    def step(self, belief: B, observation: Observation, dt: float, rng: np.random.Generator) -> tuple[B, StepInfo]:
         """The belief dt [s] later, given what was then seen."""

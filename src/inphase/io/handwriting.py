@@ -28,7 +28,9 @@ def export_handwriting(shape: str, folder: Path) -> list[Path]:
     except ImportError:
         raise OptionError("the demo needs the handwriting data: pip install 'inphase[demo]'") from None
     except (AttributeError, ValueError, OSError):
-        raise OptionError(f"no handwriting shape {shape!r} in the LASA data set; try Angle, GShape, Sine, Sshape") from None
+        raise OptionError(
+            f"no handwriting shape {shape!r} in the LASA data set; try Angle, GShape, Sine, Sshape"
+        ) from None
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
     for i, demonstration in enumerate(demonstrations, start=1):

@@ -47,10 +47,10 @@ def draw_replays(path: str | PathLike[str], panels: Sequence[ReplayPanel]) -> No
     figure = Figure(figsize=(1.2 + 3.6 * len(panels), 6.0), layout="constrained")
     canvas = FigureCanvasAgg(figure)
     if str(path).rsplit(".", 1)[-1] not in canvas.get_supported_filetypes():
-        raise OptionError(f"unknown kind of picture {path}; one of {', '.join(sorted(canvas.get_supported_filetypes()))}")
-    axes = figure.subplots(
-        2, len(panels), squeeze=False, sharex="col", gridspec_kw={"height_ratios": [3, 2]}
-    )
+        raise OptionError(
+            f"unknown kind of picture {path}; one of {', '.join(sorted(canvas.get_supported_filetypes()))}"
+        )
+    axes = figure.subplots(2, len(panels), squeeze=False, sharex="col", gridspec_kw={"height_ratios": [3, 2]})
     for column, panel in enumerate(panels):
         _draw_response(axes[0, column], panel)
         _draw_phase(axes[1, column], panel, first=column == 0)
@@ -61,7 +61,7 @@ def draw_replays(path: str | PathLike[str], panels: Sequence[ReplayPanel]) -> No
 
 def _draw_response(axes: Axes, panel: ReplayPanel) -> None:
     model, count = panel.model, len(panel.model.observed)
-    mean, std = model.distribution(np.linspace(0, 1, 100))
+    mean, _ = model.distribution(np.linspace(0, 1, 100))
     channel = int(np.argmax(np.ptp(mean[:, count:], axis=0) / model.spread[count:]))
     name, unit = model.controlled[channel], model.channels[count + channel].unit
     times = panel.demonstration.times - panel.demonstration.times[0]
@@ -72,7 +72,8 @@ def _draw_response(axes: Axes, panel: ReplayPanel) -> None:
     for response, colour in zip(panel.previews, PREVIEWS, strict=False):
         share = (response.times[0] - origin) / times[-1]
         at = response.times - origin
-        axes.plot(at, response.mean[:, channel], color=colour, lw=1.6, ls="--", label=f"rest, as foreseen at {100 * share:.0f} %")
+        label = f"rest, as foreseen at {100 * share:.0f} %"
+        axes.plot(at, response.mean[:, channel], color=colour, lw=1.6, ls="--", label=label)
         axes.plot(at[0], response.mean[0, channel], "o", color=colour, ms=5)
     axes.set_title(panel.title, fontsize=11)
     axes.set_ylabel(f"{name} [{unit}]" if unit else name)

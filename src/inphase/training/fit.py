@@ -70,7 +70,9 @@ def _check(dataset: Dataset) -> None:
         raise DataError(f"expected at least 2 demonstrations to learn from, got 1 ({dataset[0].name})")
     for role, names in (("observed", dataset.observed), ("controlled", dataset.controlled)):
         if not names:
-            raise DataError(f"expected at least one {role} channel, got none; the channels are {listing(dataset.names)}")
+            raise DataError(
+                f"expected at least one {role} channel, got none; the channels are {listing(dataset.names)}"
+            )
     everything = np.concatenate([demonstration.values for demonstration in dataset])
     for name, column in zip(dataset.names, everything.T, strict=True):
         seen = column[np.isfinite(column)]
