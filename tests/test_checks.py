@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
 
 from inphase import DataError
 from inphase.channels import Channel, make_channels
@@ -67,7 +68,7 @@ def test_nothing_is_found_in_clean_recordings(rate: float) -> None:
 def test_noise_and_rest_and_switches_are_no_faults(rng: np.random.Generator) -> None:
     times, values = clean()
     values[:, HAND_X] = rng.normal(size=len(times))  # nothing but noise
-    values[:, HAND_Y] = np.round(np.clip(times - 2, 0, 1) ** 2, 2)  # rests exactly, sets off slowly
+    values[:, HAND_Y] = np.round(1 / (1 + np.exp(10 - 5 * times)), 2)  # rests exactly, sets off slowly
     values[:, ELBOW] = times > 2  # a gripper
     assert found(times, values) == []
 
@@ -79,9 +80,9 @@ def test_jitter_of_the_clock_is_no_fault(rng: np.random.Generator) -> None:
 
 def test_what_is_found_depends_on_neither_units_nor_order_nor_the_start_of_the_clock() -> None:
     times, values = clean()
-    values[100, HAND_X] += 0.5
-    values[50:80, HAND_Y] = values[50, HAND_Y]
-    expected = {("jump", "hand_x", times[100]), ("frozen", "hand_y", times[50])}
+    values[180, HAND_X] += 0.5
+    values[105:136, HAND_Y] = values[105, HAND_Y]
+    expected = {("jump", "hand_x", times[180]), ("frozen", "hand_y", times[105])}
     assert set(found(times, values)) == expected
     order = np.random.default_rng(1).permutation(len(NAMES))
     assert set(found(times, values[:, order], tuple(CHANNELS[i] for i in order))) == expected
@@ -116,7 +117,7 @@ def test_times_that_stand_still_run_back_or_are_lost() -> None:
     assert found(times, values) == [("backwards", None, times[60])]
     times[100:] -= 0.5
     (finding,) = [f for f in check_episode("one", times, values, CHANNELS) if f.severity == "error"]
-    assert finding.message == "time does not increase twice: first 0.98333 s comes after 0.98333 s"
+    assert finding.message == "time does not increase twice: first 0.9833 s comes after 0.9833 s"
     times, values = clean()
     times[[7, 9]] = np.nan, np.inf
     assert found(times, values) == [("backwards", None, None)]
@@ -128,7 +129,7 @@ def test_gaps() -> None:
     keep[60:70] = keep[120:150] = False
     (finding,) = check_episode("one", times[keep], values[keep], CHANNELS)
     assert (finding.kind, finding.channel, finding.time) == (FindingKind.GAP, None, times[59])
-    assert "twice, the longest from 1.98333 s to 2.5 s" in finding.message
+    assert "twice, the longest from 1.9833 s to 2.5 s" in finding.message
     keep[:] = True
     keep[60:62] = False  # two frames dropped are three steps: not longer than a gap must be
     assert found(times[keep], values[keep]) == []
@@ -149,7 +150,7 @@ def test_infinite_values() -> None:
     assert found(times, values) == [("infinite", "hand_y", times[30])]
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(
     st.lists(st.tuples(st.integers(0, 240), st.integers(1, 30)), min_size=1, max_size=3), st.integers(0, len(NAMES) - 1)
 )
@@ -181,7 +182,7 @@ def test_constant_channels(level: float) -> None:
     assert found(times, values) == [("not-a-number", "elbow", times[20]), ("constant", "elbow", None)]
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(st.integers(30, 60), st.integers(10, 60))
 def test_a_sensor_that_hangs_while_things_move(start: int, length: int) -> None:
     times, values = clean()
@@ -189,24 +190,24 @@ def test_a_sensor_that_hangs_while_things_move(start: int, length: int) -> None:
     # It may catch up in a jump; and at the crest of its swing, nobody can tell.
     wanted = [("frozen", "hand_y", times[start])]
     catching_up = abs(np.diff(values[start + length : start + length + 2, HAND_Y])[0])
-    if catching_up > 0.03:
+    if catching_up > 0.02:
         assert [f for f in found(times, values) if f[0] != "jump"] == wanted
-    elif catching_up < 0.015:
+    elif catching_up < 0.003 and abs(np.diff(values[start - 1 : start + 1, HAND_Y])[0]) < 0.003:
         assert found(times, values) == []
 
 
 def test_a_sensor_that_dies_and_a_recorder_that_hangs() -> None:
-    times, values = clean(rate=30)
-    moving = int(np.argmax(np.abs(np.diff(values[:, HAND_Y]))))
-    values[moving + 1 :, HAND_Y] = values[moving + 1, HAND_Y]
-    values[: moving + 1, HAND_Y] += 0.01 * np.arange(moving + 1)  # so that it stops from a fast movement
-    assert ("frozen", "hand_y", times[moving + 1]) in found(times, values)
+    times, values = clean()
+    values[:, HAND_Y] = np.minimum(times, times[40]) ** 2
+    assert found(times, values) == [("frozen", "hand_y", times[40])]
+    values[:, HAND_Y] = values[::-1, HAND_Y]
+    assert found(times, values) == [("frozen", "hand_y", times[0])]
     times, values = clean()
     values[100:150] = values[100]
     assert [f for f in found(times, values) if f[0] == "frozen"] == [("frozen", None, times[100])]
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(st.integers(1, 238), st.sampled_from([-1, 1]), st.floats(0.75, 100), st.booleans())
 def test_jumps(at: int, sign: int, size: float, stays: bool) -> None:
     times, values = clean()
@@ -258,7 +259,7 @@ def test_whole_turns(column: int, name: str) -> None:
 
 def test_an_angle_jumps_beyond_its_turns() -> None:
     times, values = clean()
-    values[:, WHEEL] = (values[:, WHEEL] + 6 * times + 3 * (times > 2)) % (2 * np.pi)
+    values[:, WHEEL] = (values[:, WHEEL] + 3 * times + 1.5 * (times > 2)) % (2 * np.pi)
     assert ("jump", "wheel", times[121]) in found(times, values)
 
 
@@ -296,7 +297,8 @@ def test_quaternions_off_norm() -> None:
 def test_a_quaternion_jumps_as_one() -> None:
     times, values = clean()
     x, y, z, w = values[100:, HEAD].T.copy()
-    values[100:, HEAD] = np.column_stack([w, z, -y, -x])  # turned by half a turn about x
+    values[100:, HEAD] += np.column_stack([w, z, -y, -x])  # turned by a quarter about x, but for the norm
+    values[100:, HEAD] /= np.sqrt(2)
     assert found(times, values) == [("jump", "head_q", times[100])]
 
 
@@ -304,7 +306,7 @@ def test_a_quaternion_jumps_as_one() -> None:
 
 
 def test_an_episode_that_lasts_too_long_or_not_long_enough() -> None:
-    for duration in (1.5, 12.0):
+    for duration in (1.0, 20.0):
         episodes = crowd() | {"odd": clean(9, duration=duration)}
         assert [(f.kind.value, f.episode) for f in across(episodes)] == [("length", "odd")]
 
@@ -318,7 +320,7 @@ def test_unequal_clocks() -> None:
     assert (finding.kind, finding.episode, finding.channel) == (FindingKind.CLOCK, "odd", None)
     assert finding.message == "30 samples a second, the others 60 (median)"
     (finding,) = across({"a": clean(0, rate=30), "b": clean(1, rate=60)})
-    assert (finding.kind, finding.episode) == (FindingKind.CLOCK, "b")
+    assert (finding.kind, finding.episode) == (FindingKind.CLOCK, "a")
 
 
 def test_a_channel_that_is_dead_in_all() -> None:
@@ -392,22 +394,22 @@ def test_errors_are_what_a_data_set_refuses() -> None:
     assert {kind.severity for kind in FindingKind} == {"error", "warning"}
 
 
-@settings(max_examples=60)
-@given(st.data())
-def test_any_numbers_can_be_checked(data: st.DataObject) -> None:
-    wild = st.sampled_from([0.0, -0.0, 1.0, 1.0, 2.0, -5.0, np.nan, np.inf, -np.inf, 1e300, 1e-300])
-    count = data.draw(st.integers(0, 8))
-    times = np.array(data.draw(st.lists(wild, min_size=count, max_size=count)), dtype=float)
-    row = st.lists(wild, min_size=len(NAMES), max_size=len(NAMES))
-    values = np.array(data.draw(st.lists(row, min_size=count, max_size=count)), dtype=float).reshape(count, -1)
-    values = values.reshape(count, len(NAMES))
-    check([("one", times, values), ("two", *clean()), ("three", times, values)], CHANNELS)
+WILD = st.sampled_from([0.0, -0.0, 1.0, 2.0, -5.0, np.nan, np.inf, -np.inf, 1e300, -1e300, 1e-300])
+
+
+@settings(max_examples=25)
+@given(hnp.arrays(np.float64, st.tuples(st.integers(0, 8), st.just(1 + len(NAMES))), elements=WILD))
+def test_any_numbers_can_be_checked(cells: np.ndarray) -> None:
+    wild = cells[:, 0], cells[:, 1:]
+    check([("one", *wild), ("two", *clean()), ("three", *wild)], CHANNELS)
 
 
 def test_shapes_that_do_not_fit_are_refused() -> None:
     times, values = clean()
     with pytest.raises(DataError, match="one: expected 9 channels"):
         check_episode("one", times, values[:, :3], CHANNELS)
+    with pytest.raises(DataError, match="two: expected 9 channels"):
+        check([("one", times, values), ("two", times, values[:, :3])], CHANNELS)
 
 
 # --------------------------------------------------------------------------------------------------- real recordings

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import expm
@@ -87,6 +87,7 @@ def angle_columns(case):
     return [columns[0] for kind, columns in zip(case.parts, columns_of(case.parts), strict=True) if kind == "angle"]
 
 
+@settings(max_examples=40)
 @given(recordings())
 def test_there_and_back_again(case):
     coordinates = Coordinates.learn(case.channels, case.values)
@@ -103,6 +104,7 @@ def test_there_and_back_again(case):
         assert_array_equal(var, 0)
 
 
+@settings(max_examples=40)
 @given(recordings())
 def test_the_sign_of_a_quaternion_means_nothing(case):
     flipped = [v.copy() for v in case.values]
@@ -125,6 +127,7 @@ def test_the_sign_means_nothing_even_half_a_turn_away():
         assert np.linalg.norm(one) == pytest.approx(np.pi)
 
 
+@settings(max_examples=40)
 @given(recordings())
 def test_whole_turns_of_an_angle_mean_nothing(case):
     shifted = [v.copy() for v in case.values]
@@ -136,6 +139,7 @@ def test_whole_turns_of_an_angle_mean_nothing(case):
         assert_allclose(one.from_channels(a), other.from_channels(b), atol=1e-12)
 
 
+@settings(max_examples=40)
 @given(recordings(step=0.1))
 def test_what_is_missing_is_missing_and_changes_nothing_else(case):
     coordinates = Coordinates.learn(case.channels, case.values)
@@ -163,6 +167,7 @@ def test_what_is_missing_is_missing_and_changes_nothing_else(case):
     assert_array_equal(Coordinates.learn(case.channels, []).references, neutral)
 
 
+@settings(max_examples=40)
 @given(recordings(), st.floats(0, 0.5))
 def test_live_samples_read_as_the_whole_trajectory_does(case, missing):
     coordinates = Coordinates.learn(case.channels, case.values)
@@ -186,9 +191,11 @@ def spin(turns, samples=200):
     return Coordinates(channels_of(["angle", "quaternion"]), np.r_[0.0, start.as_quat()]), values, angle, axis
 
 
-@pytest.mark.parametrize("turns", [0.9, -0.9, 2.3, -3.4])
-def test_angles_and_rotations_go_on_through_several_turns(turns):
+@pytest.mark.parametrize(("turns", "first"), [(0.9, 0), (-0.9, 0), (2.3, 0), (-3.4, 0), (0.6, 165), (-0.6, 165)])
+def test_angles_and_rotations_go_on_through_several_turns(turns, first):
     coordinates, values, angle, axis = spin(turns)
+    # From `first` on: the seam may lie between the first two samples.
+    values, angle = values[first:], angle[first:]
     expected = np.column_stack([angle, angle[:, None] * axis])
     assert_allclose(coordinates.from_channels(values), expected, atol=1e-12)
     live = [coordinates.sample(values[i], expected[max(i - 1, 0)]) for i in range(len(values))]
@@ -218,6 +225,7 @@ def test_the_branch_nearest_to_the_prediction_is_taken(seed, turns):
     assert_array_equal(nearest(np.zeros((1, 3)), np.zeros((1, 3))), 0)
 
 
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1))
 def test_a_rotation_vector_is_the_logarithm_of_the_rotation_from_the_reference(seed):
     rng = np.random.default_rng(seed)
@@ -229,6 +237,7 @@ def test_a_rotation_vector_is_the_logarithm_of_the_rotation_from_the_reference(s
     assert_allclose(reference.as_matrix() @ turn, other.as_matrix(), atol=1e-12)
 
 
+@settings(max_examples=40)
 @given(recordings(step=0.3), st.integers(0, 2**32 - 1))
 def test_turning_the_world_turns_no_feature(case, seed):
     world = Rotation.random(rng=np.random.default_rng(seed))
@@ -285,15 +294,31 @@ def test_references_are_the_mean_angle_and_orientation(rng):
     found = Coordinates.learn(channels, [values[:2], values[2:]]).references
     assert abs(np.exp(1j * found[0]) + 1) < 1e-12
     assert_allclose(found[1:], base.as_quat() * np.sign(base.as_quat()[3]), atol=1e-12)
-    assert average(np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0]])) is None
+    for turn in Rotation.random(20, rng=rng):
+        mean = average(np.tile(turn.as_quat(), (3, 1)))
+        assert abs(mean @ turn.as_quat()) == pytest.approx(1)
+        assert mean[3] > 0
+    # Half a turn apart there is no middle, and the first start serves, of whatever sign.
+    apart = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0]])
+    assert average(apart) is None
+    for sign in (1, -1):
+        found = Coordinates.learn(channels_of(["quaternion"]), [sign * apart[:1], apart[1:]]).references
+        assert_array_equal(found, apart[0])
 
 
-@pytest.mark.parametrize("reach", [1.0, 0.9, 0.75, 0.5, 0.25])
+@pytest.mark.parametrize("start", [0.0, 1.0, 2.0, 3.0, -1.0, -2.0])
+def test_an_angle_that_goes_all_round_is_measured_from_where_it_starts(start):
+    angle = start + np.linspace(0.0, TAU, 50, endpoint=False)
+    found = Coordinates.learn(channels_of(["angle"]), [angle[:, None]]).references
+    assert_allclose(found, start, atol=1e-9)
+
+
+@pytest.mark.parametrize("reach", [1.0, 0.85, 0.75, 0.5, 0.25])
 @pytest.mark.parametrize("base", [0.0, 2.0, np.pi, -0.5])
-def test_demonstrations_that_start_alike_stay_on_one_branch_however_far_they_turn(rng, reach, base):
+def test_demonstrations_that_start_alike_stay_on_one_branch_however_far_they_turn(reach, base):
     """Also where an angle turns all the way round and has no mean."""
     axis = np.array([0.0, 0.6, 0.8])
-    starts = base + rng.uniform(-0.5, 0.5, 8)
+    starts = base + np.linspace(-0.8, 0.8, 8)
     paths = [start + np.linspace(0.0, reach * TAU, 60) for start in starts]
     turned_by = [Rotation.from_rotvec(path[:, None] * axis).as_quat() for path in paths]
     values = [np.column_stack([np.angle(np.exp(1j * p)), q]) for p, q in zip(paths, turned_by, strict=True)]

@@ -24,7 +24,7 @@ def minimum_jerk(times, onset, offset):
     return s**3 * (10 - 15 * s + 6 * s**2)
 
 
-def episode(rng, onset, offset, duration, rate=60.0, noise=0.002, missing=0.1, jitter=0.3):
+def episode(rng, onset, offset, duration, rate=60.0, noise=0.001, missing=0.1, jitter=0.3):
     """Two hands that reach at once and stand still before and after, seen by a noisy sensor that misses samples."""
     times = np.arange(0.0, duration, 1 / rate)
     times = times + rng.uniform(-jitter, jitter, len(times)) / 2 / rate
@@ -158,6 +158,8 @@ def test_what_has_no_idle_end_or_would_vanish_is_left_whole(rng):
     for was, now in zip(recorded, trim(recorded), strict=True):
         assert_array_equal(now.times, was.times)
         assert_array_equal(now.values, was.values)
+    nothing = dataset([(times, still)])
+    assert_array_equal(trim(nothing)[0].values, still)
 
 
 def test_provenance_and_channels_stay_and_mistakes_are_named(rng):

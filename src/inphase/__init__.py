@@ -18,7 +18,7 @@ from inphase.preprocess import trim
 from inphase.preprocess.scaling import Scaling
 from inphase.result import Estimate, Response, Status
 from inphase.session import Session
-from inphase.training import fit, learn_noise, learn_phase
+from inphase.training import fit, learn_phase
 from inphase.trajectory import Dataset, Demonstration
 from inphase.weight_prior import WeightPrior
 
@@ -47,7 +47,6 @@ __all__ = [
     "WeightPrior",
     "basis",
     "fit",
-    "learn_noise",
     "learn_phase",
     "load",
     "trim",

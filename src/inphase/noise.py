@@ -42,5 +42,5 @@ class Noise:
         """
         white = self.correlation_time == 0
         news = np.where(white, 1.0, np.tanh(interval / np.where(white, 1.0, 2 * self.correlation_time)))
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             return np.asarray(self.var / news)

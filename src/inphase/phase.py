@@ -38,12 +38,19 @@ class PhaseModel:
                 f"expected a phase prior of order 0, 1 or 2 with mean (K,) and cov (K, K), "
                 f"got {self.mean.shape} and {self.cov.shape}"
             )
-        if not (self.diffusion >= 0 and self.nominal_velocity > 0 and np.isfinite(self.nominal_velocity)):
+        if not (0 <= self.diffusion < np.inf and 0 < self.nominal_velocity < np.inf):
             raise OptionError(
-                f"expected diffusion >= 0 and nominal_velocity > 0, got {self.diffusion} and {self.nominal_velocity}"
+                f"expected a finite diffusion >= 0 and nominal_velocity > 0, "
+                f"got {self.diffusion} and {self.nominal_velocity}"
             )
-        if not np.isfinite(self.mean).all() or np.linalg.eigvalsh(self.cov).min() < -1e-12 * np.trace(self.cov):
-            raise OptionError(f"expected a finite mean and a positive semi-definite cov, got {self.mean}, {self.cov}")
+        finite = np.isfinite(self.mean).all() and np.isfinite(self.cov).all()
+        scale = np.abs(self.cov).max() if finite else 1.0
+        if (
+            not finite
+            or np.abs(self.cov - self.cov.T).max() > 1e-12 * scale
+            or np.linalg.eigvalsh(self.cov).min() < -1e-12 * scale
+        ):
+            raise OptionError(f"expected a finite mean and a covariance, got {self.mean.tolist()}, {self.cov.tolist()}")
 
     @property
     def order(self) -> int:

@@ -2,16 +2,34 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Sequence
 
 from inphase.errors import InphaseError
 
-BAD_INPUT = 2  # exit code
+BAD_INPUT, STOPPED = 2, 130  # exit codes
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0, or 2 with one clear line on bad input."""
+    try:
+        try:
+            return _run(sys.argv[1:] if arguments is None else list(arguments))
+        finally:
+            sys.stdout.flush()  # a reader that has gone shows here, and not when Python ends
+    except BrokenPipeError:  # as `head` does; what is still to be said goes nowhere
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except (InphaseError, OSError) as error:
+        print("inphase:", " ".join(str(error).split()), file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("inphase: stopped", file=sys.stderr)
+        return STOPPED
+
+
+def _run(arguments: Sequence[str]) -> int:
     import tyro
 
     from inphase.cli.demo import demo
@@ -27,20 +45,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "inspect": inspect,
         "replay": replay,
     }
-    try:
-        code: int = tyro.extras.subcommand_cli_from_dict(
-            commands,
-            prog="inphase",
-            description="Learn from recordings how two partners move together, then move with one of them live.",
-            args=sys.argv[1:] if arguments is None else list(arguments),
-        )
-    except InphaseError as error:
-        print(f"inphase: {error}", file=sys.stderr)
-        return BAD_INPUT
-    except KeyboardInterrupt:
-        print("inphase: stopped", file=sys.stderr)
-        return 130
-    except BrokenPipeError:  # the reader of our output has gone, as `head` does
-        sys.stderr.close()
-        return 0
+    code: int = tyro.extras.subcommand_cli_from_dict(
+        commands,
+        prog="inphase",
+        description="Learn from recordings how two partners move together, then move with one of them live.",
+        args=arguments,
+        config=(tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone),
+    )
     return code

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from inphase.cli.basis_text import show_basis
+from inphase.cli.console import counted
 from inphase.model import Model
 from inphase.trajectory import Dataset
 
@@ -23,7 +26,7 @@ def describe_model(model: Model) -> dict[str, Any]:
             "unit": model.channels[positions[0]].unit,
             "kind": model.channels[positions[0]].kind.value,
             "group": group,
-            "basis": str(basis),
+            "basis": show_basis(basis),
             "low": float(low),
             "high": float(high),
             "noise_std": float(std),
@@ -65,27 +68,30 @@ def print_model(console: Console, model: Model) -> None:
         f"typical duration {card['typical_duration']:.2f} s{tempo}, phase of order {card['order']}"
         f"{', periodic' if card['periodic'] else ''}"
     )
-    table = Table(box=None, pad_edge=False)
-    for title, side in (("channel", "left"), ("role", "left"), ("unit", "left"), ("kind", "left"), ("basis", "left")):
-        table.add_column(title, justify=side, no_wrap=True)  # type: ignore[arg-type]
-    for title in ("low", "high", "noise ±", "correlated [s]"):
-        table.add_column(title, justify="right", no_wrap=True)
-    for row in card["features"]:
-        numbers = (row["low"], row["high"], row["noise_std"], row["noise_correlation_time"])
-        table.add_row(
-            row["feature"], row["role"], row["unit"], row["kind"], row["basis"], *(f"{n:.3g}" for n in numbers)
-        )
-    console.print(table)
+    rows = [
+        {
+            "channel": row["feature"],
+            "role": row["role"],
+            "unit": row["unit"],
+            "kind": row["kind"].replace("linear", ""),
+            "basis": row["basis"],
+            "from": f"{row['low']:.3g}",
+            "to": f"{row['high']:.3g}",
+            "noise ±": f"{row['noise_std']:.2g}",
+            "lasts [s]": f"{row['noise_correlation_time']:.2g}",
+        }
+        for row in card["features"]
+    ]
+    console.print(_table(rows, numbers=("from", "to", "noise ±", "lasts [s]")), soft_wrap=False)
 
 
 def describe_dataset(dataset: Dataset) -> dict[str, Any]:
     """What a data set holds, as plain values for people and machines."""
     everything = np.concatenate([d.values for d in dataset])
-    steps = [float(np.median(np.diff(d.times))) for d in dataset]
     return {
         "episodes": [
-            {"name": d.name, "samples": len(d), "duration": d.duration, "rate": 1 / step}
-            for d, step in zip(dataset, steps, strict=True)
+            {"name": d.name, "samples": len(d), "duration": d.duration, "rate": 1 / float(np.median(np.diff(d.times)))}
+            for d in dataset
         ],
         "channels": [
             {
@@ -108,22 +114,43 @@ def print_dataset(console: Console, dataset: Dataset) -> None:
     card = describe_dataset(dataset)
     durations = [episode["duration"] for episode in card["episodes"]]
     rates = [episode["rate"] for episode in card["episodes"]]
+    samples = sum(episode["samples"] for episode in card["episodes"])
     console.print(
-        f"{len(durations)} episodes of {min(durations):.2f} … {max(durations):.2f} s "
-        f"(median {np.median(durations):.2f} s) at {_range(rates)} Hz, "
-        f"{sum(episode['samples'] for episode in card['episodes'])} samples"
+        f"{counted(len(durations), 'episode')} of {_range(durations)} s at {_range(rates)} Hz, "
+        f"{counted(samples, 'sample')}"
     )
+    rows = [
+        {
+            "channel": row["name"],
+            "role": row["role"],
+            "kind": row["kind"].replace("linear", ""),
+            "group": row["group"],
+            "from": "–" if row["low"] is None else f"{row['low']:.4g}",
+            "to": "–" if row["high"] is None else f"{row['high']:.4g}",
+            "missing": f"{100 * row['missing']:.1f} %" if row["missing"] else "",
+        }
+        for row in card["channels"]
+    ]
+    console.print(_table(rows, numbers=("from", "to", "missing")), soft_wrap=False)
+
+
+def _table(rows: Sequence[dict[str, str]], numbers: Sequence[str]) -> Table:
+    """A line a row, under a line for its role where there are two; less the columns in which nothing stands."""
     table = Table(box=None, pad_edge=False)
-    for title in ("channel", "role", "kind", "group"):
-        table.add_column(title, no_wrap=True)
-    for title in ("low", "high", "missing"):
-        table.add_column(title, justify="right", no_wrap=True)
-    for row in card["channels"]:
-        low, high = ("–" if row[key] is None else f"{row[key]:.4g}" for key in ("low", "high"))
-        table.add_row(row["name"], row["role"], row["kind"], row["group"], low, high, f"{100 * row['missing']:.1f} %")
-    console.print(table)
+    titles = [title for title in rows[0] if title != "role" and any(row[title] for row in rows)]
+    for title in titles:
+        table.add_column(title, justify="right" if title in numbers else "left", no_wrap=title != "channel")
+    table.columns[0].overflow, table.columns[0].min_width = "fold", 12
+    roles = dict.fromkeys(row["role"] for row in rows)
+    for role in roles:
+        if len(roles) > 1:
+            table.add_row(role, style="bold")
+        for row in rows:
+            if row["role"] == role:
+                table.add_row(*(row[title] for title in titles))
+    return table
 
 
-def _range(values: list[float]) -> str:
+def _range(values: Sequence[float]) -> str:
     low, high = f"{min(values):.3g}", f"{max(values):.3g}"
     return low if low == high else f"{low} … {high}"

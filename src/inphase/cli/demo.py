@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import shlex
+import shutil
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import tyro
-from rich.console import Console
 
-from inphase.cli.replay import figures, panel, play, print_summary
-from inphase.errors import OptionError
+from inphase.cli.console import Output
+from inphase.cli.follow import follow
+from inphase.cli.picture import panel
+from inphase.cli.scores import LEGEND, ScoreTable, figures
+from inphase.errors import OptionError, listing
+from inphase.filters import FILTERS
 from inphase.io import load
 from inphase.io.handwriting import export_handwriting
-from inphase.report.replay_picture import draw_replays
+from inphase.report.replay_picture import check_picture, draw_replays
 from inphase.training import fit
 
 SHAPES = ("Angle", "GShape", "Sine", "Sshape")
@@ -20,46 +26,65 @@ SHAPES = ("Angle", "GShape", "Sine", "Sshape")
 
 def demo(
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("inphase-demo"),
-    shapes: tuple[str, ...] = SHAPES,
+    shapes: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SHAPE...")] = SHAPES,
     filter: str = "ebip",
     seed: int = 0,
 ) -> int:
     """Learn from real human handwriting, and follow a hand that was never seen.
 
-    The pen's x is taken for the partner and its y for the robot. For every shape a model is trained on all
-    demonstrations but the last; the last is then played sample by sample, x alone, and y is answered.
-
     Args:
         output: the folder for recordings, models and the picture
         shapes: of the LASA handwriting data set
-        filter: how phase and weights are inferred: bip or ebip
+        filter: how phase and weights are inferred, bip or ebip
         seed: of the filter's random numbers
     """
-    console = Console(highlight=False)
-    if output.exists() and not output.is_dir():
-        raise OptionError(f"cannot write into {output}: expected a folder, got a file")
-    results, panels = [], []
+    picture = output / "demo.png"
+    _check(output, picture, shapes, filter)
+    console = Output()
+    console.print("Real handwriting: the pen's x is the partner that is seen, its y the robot that answers.\n")
+    table, results, panels = ScoreTable(console, shapes), [], []
     for shape in shapes:
         export_handwriting(shape, output / shape)
-        dataset = load(str(output / shape), observed=["x"], controlled=["y"], units={"*": "mm"})
-        last = dataset[len(dataset) - 1]
-        model = fit(dataset.without(len(dataset) - 1))
+        dataset = load(output / shape, observed=["x"], controlled=["y"], units={"*": "mm"})
+        last = dataset[-1]
+        model = fit(dataset.without(-1))
         model.save(output / f"{shape}.inphase")
-        console.rule(f"{shape}: trained on {len(dataset) - 1} demonstrations, following the one left out", align="left")
-        played, update = play(console, model, last, filter, seed)
-        results.append({"episode": shape, **figures(model, last, played), "update": update})
+        console.print(f"{shape}: learned from {len(dataset) - 1} demonstrations, following the one left out")
+        played, _ = follow(console, model.session(filter, seed), last)
+        console.print()
+        results.append(figures(model, last, played))
         panels.append(panel(shape, model, last, played))
-    console.rule("how well y was answered, x alone being seen", align="left")
-    print_summary(console, results, filter)
-    picture = output / "demo.png"
+    table.print_head()
+    for shape, found in zip(shapes, results, strict=True):
+        table.print_row(shape, found)
+    console.print(LEGEND, style="dim")
     draw_replays(picture, panels)
-    shape = shapes[-1]
-    console.print(f"\nwrote the picture {picture}, models and recordings into {output}", soft_wrap=True)
+    console.print(f"\nwrote the picture {picture}, and models and recordings beside it")
     console.print("next, try:", style="bold")
-    for command in (
-        f"inphase inspect {output / shape}.inphase",
-        f"inphase replay {output / shape}.inphase {output / shape / last.name}.csv --filter bip",
-        f"inphase fit {output / shape} --observed x --controlled y --basis gaussian:20 -o {shape}.inphase",
+    model_file, recordings = output / f"{shapes[-1]}.inphase", output / shapes[-1]
+    for words in (
+        ["inspect", model_file],
+        ["replay", model_file, recordings / f"{last.name}.csv", "--filter", "bip"],
+        ["fit", recordings, "--observed", "x", "--controlled", "y", "--basis", "gaussian:20", "-o", "my.inphase"],
     ):
-        console.print(f"  {command}", soft_wrap=True)
+        console.print(f"  {_program()} {shlex.join(map(str, words))}")
     return 0
+
+
+def _check(output: Path, picture: Path, shapes: tuple[str, ...], filter: str) -> None:
+    """Refuse what cannot end well, before anything is written."""
+    if output.exists() and not output.is_dir():
+        raise OptionError(f"cannot write into {output}: expected a folder, got a file")
+    if not shapes:
+        raise OptionError(f"expected at least one shape, such as {listing(SHAPES)}, got none")
+    if filter not in FILTERS:
+        raise OptionError(f"unknown filter {filter!r}; one of {listing(FILTERS)}")
+    check_picture(picture)
+
+
+def _program() -> str:
+    """How this program was called, so that a line can be pasted: it need not be on the path, as under `make demo`."""
+    called = sys.argv[0]
+    if Path(called).stem != "inphase" or shutil.which("inphase") == called:
+        return "inphase"
+    return shlex.quote(called)

@@ -8,59 +8,53 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
-from rich.console import Console
 
-from inphase import basis as families
-from inphase.basis import Basis
+from inphase.cli.basis_text import parse_basis
 from inphase.cli.card import describe_model, print_model
-from inphase.cli.reading import Columns
-from inphase.errors import OptionError
+from inphase.cli.console import Output, waiting
+from inphase.cli.reading import AsJson, Columns, Recordings
+from inphase.errors import OptionError, listing
+from inphase.io import find_episodes, read_episode
 from inphase.training import fit as fit_model
 from inphase.training import learn_phase
 
 
 def fit(
-    data: tyro.conf.Positional[tuple[str, ...]],
+    data: Recordings,
     columns: tyro.conf.OmitArgPrefixes[Columns],
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("model.inphase"),
-    basis: str = "",
+    basis: Annotated[str | None, tyro.conf.arg(metavar="FAMILY:SIZE", help_behavior_hint="")] = None,
     order: int = 1,
-    periodic: bool = False,
-    json_: Annotated[bool, tyro.conf.arg(name="json")] = False,
+    periodic: Annotated[bool, tyro.conf.arg(help_behavior_hint="")] = False,
+    json_: AsJson = False,
 ) -> int:
     """Learn a model from recordings.
 
     Args:
-        data: files, folders or globs of CSV or npz episodes
+        data: files, folders or globs of CSV or npz recordings, one episode a file
         columns: what the columns are
         output: the model file to write
-        basis: basis functions of every channel, as family:size (gaussian:15); by default the library's choice
-        order: 0 phase alone, 1 with tempo, 2 with a tempo that accelerates
+        basis: basis functions of every channel, such as gaussian:15; otherwise the library's choice
+        order: of the phase: 0 alone, 1 with tempo, 2 with a tempo that accelerates
         periodic: an episode is one cycle of an interaction that goes on and on
         json_: print the model's card as JSON
     """
+    chosen = parse_basis(basis) if basis is not None else None
+    if not (columns.observed and columns.controlled):
+        first = read_episode(find_episodes(data)[0], time=columns.time, delimiter=columns.separator)
+        raise OptionError(
+            f"expected --observed and --controlled, the channels of either partner; "
+            f"{first.name} has the channels {listing(first.columns)}"
+        )
     dataset = columns.load(data)
-    phase = learn_phase(dataset, order, periodic)
-    model = fit_model(dataset, basis=_basis(basis) if basis else None, phase=phase)
+    with waiting(f"learning from {len(dataset)} demonstrations"):
+        model = fit_model(dataset, basis=chosen, phase=learn_phase(dataset, order, periodic))
     model.save(output)
     if json_:
         json.dump({"model": str(output), **describe_model(model)}, sys.stdout, indent=1)
         print()
         return 0
-    console = Console(highlight=False)
+    console = Output()
     print_model(console, model)
-    console.print(f"wrote {output} ({output.stat().st_size / 1e3:.0f} kB)", soft_wrap=True)
+    console.print(f"wrote {output} ({output.stat().st_size / 1e3:.0f} kB)")
     return 0
-
-
-def _basis(text: str) -> Basis:
-    """The basis of `family:size`, or `family:size:width`."""
-    family, *numbers = text.split(":")
-    try:
-        size = int(numbers[0])
-        width = [float(number) for number in numbers[1:]]
-    except (IndexError, ValueError):
-        raise OptionError(f"basis: expected family:size or family:size:width, got {text!r}") from None
-    if family == "polynomial":
-        return families.make(family, degree=size)
-    return families.make(family, size=size, **({"width": width[0]} if width else {}))

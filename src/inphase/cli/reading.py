@@ -1,34 +1,57 @@
-"""How every command is told what a recording's columns are."""
+"""How every command is told which recordings to read, and what their columns are."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
 
 from inphase.channels import Kind
+from inphase.cli.console import waiting
 from inphase.io import load
 from inphase.trajectory import Dataset
 
+Recordings = Annotated[
+    tuple[str, ...],
+    tyro.conf.Positional,
+    tyro.conf.arg(metavar="PATH...", help_behavior_hint="(required)"),
+]
+AsJson = Annotated[bool, tyro.conf.arg(name="json", help_behavior_hint="")]
+Patterns = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME...", help_behavior_hint="")]
+
 
 @dataclass(frozen=True)
-class Columns:
-    """What the columns of the recordings are."""
+class Format:
+    """How recordings are written."""
 
-    observed: tuple[str, ...] = ()
-    """names or patterns ('taker_?') of the channels of the partner that is observed"""
-    controlled: tuple[str, ...] = ()
-    """names or patterns of the channels of the partner that is controlled, the robot"""
     time: str = "time"
     """the column of times [s]"""
-    delimiter: str = ","
-    """what stands between columns; 'tab' for a tabulator"""
-    angle: tuple[str, ...] = ()
-    """names or patterns of channels that are angles [rad] and may jump by a full turn"""
-    quaternion: tuple[str, ...] = ()
-    """… that are parts x, y, z, w of a quaternion (those named …qx to …qw are found by themselves)"""
-    linear: tuple[str, ...] = ()
-    """… that are plain numbers although they are named like a quaternion"""
-    trim: bool = False
+    delimiter: Annotated[str, tyro.conf.arg(metavar="CHAR")] = ","
+    """what stands between the columns of a CSV file; tab for a tabulator"""
+
+    @property
+    def separator(self) -> str:
+        """The delimiter as a character."""
+        return "\t" if self.delimiter in ("tab", "\\t") else self.delimiter
+
+
+@dataclass(frozen=True)
+class Columns(Format):
+    """What the columns of recordings are."""
+
+    observed: Patterns = ()
+    """channels of the partner that is observed: names or patterns ('taker_?')"""
+    controlled: Patterns = ()
+    """channels of the partner that is controlled, the robot"""
+    angle: Patterns = ()
+    """channels that are angles [rad] and may jump by a full turn"""
+    quaternion: Patterns = ()
+    """channels that are parts x, y, z, w of a quaternion; those named ..qx to ..qw are found without"""
+    linear: Patterns = ()
+    """channels that are plain numbers although they are named like a quaternion"""
+    trim: Annotated[bool, tyro.conf.arg(help_behavior_hint="")] = False
     """cut off the idle start and end of every episode"""
 
     @property
@@ -37,19 +60,15 @@ class Columns:
         named = ((self.angle, Kind.ANGLE), (self.quaternion, Kind.QUATERNION), (self.linear, Kind.LINEAR))
         return {pattern: kind.value for patterns, kind in named for pattern in patterns}
 
-    @property
-    def separator(self) -> str:
-        """The delimiter as a character."""
-        return "\t" if self.delimiter in ("tab", "\\t") else self.delimiter
-
-    def load(self, source: str | Sequence[str]) -> Dataset:
+    def load(self, source: Sequence[str]) -> Dataset:
         """The data set of these files, folders or globs; raises DataError and ChannelError."""
-        return load(
-            source,
-            self.observed,
-            self.controlled,
-            time=self.time,
-            delimiter=self.separator,
-            kinds=self.kinds,
-            trim=self.trim,
-        )
+        with waiting("reading recordings"):
+            return load(
+                source,
+                self.observed,
+                self.controlled,
+                time=self.time,
+                delimiter=self.separator,
+                kinds=self.kinds,
+                trim=self.trim,
+            )

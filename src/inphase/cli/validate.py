@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import json
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
 
 import tyro
-from rich.console import Console
 from rich.table import Table as PrintedTable
 
 from inphase.channels import make_channels
-from inphase.cli.reading import Columns
-from inphase.errors import ChannelError, DataError
+from inphase.cli.console import Output, counted, waiting
+from inphase.cli.reading import AsJson, Columns, Recordings
+from inphase.errors import DataError
 from inphase.io import Table, find_episodes, pick_roles, read_episode
 from inphase.io.files import episode_names
 from inphase.preprocess.checks import Finding, FindingKind, check
@@ -25,24 +25,38 @@ CANNOT_BE_USED = 1  # exit code
 
 
 def validate(
-    data: tyro.conf.Positional[tuple[str, ...]],
+    data: Recordings,
     columns: tyro.conf.OmitArgPrefixes[Columns],
-    json_: Annotated[bool, tyro.conf.arg(name="json")] = False,
+    json_: AsJson = False,
 ) -> int:
-    """Say what is wrong with recordings: gaps, jumps, sign flips, dead channels, odd clocks; nothing is changed.
-
-    Exit code 1 when an episode cannot be used as it is, 0 when there is nothing worse than a warning.
+    """Say what is wrong with recordings; nothing is changed. Exit code 1 if an episode cannot be used as it is.
 
     Args:
-        data: files, folders or globs of CSV or npz episodes
+        data: files, folders or globs of CSV or npz recordings, one episode a file
         columns: what the columns are; without patterns all are looked at
         json_: print the findings as JSON
     """
     paths = find_episodes(data)
+    with waiting(f"looking at {counted(len(paths), 'episode')}"):
+        channels, findings = _findings(paths, columns)
+    findings.sort(key=lambda finding: finding.severity)
+    if json_:
+        json.dump([{**asdict(f), "kind": f.kind.value, "severity": f.severity} for f in findings], sys.stdout, indent=1)
+        print()
+    else:
+        _print(findings, len(paths), channels)
+    return CANNOT_BE_USED if any(f.severity == "error" for f in findings) else 0
+
+
+def _findings(paths: Sequence[Path], columns: Columns) -> tuple[int, list[Finding]]:
+    """How many channels were looked at, and what was found."""
     tables, findings = _read(paths, columns)
     if not tables:
         raise DataError(findings[0].message)
-    names = [name for role in pick_roles(tables[0][1], columns.observed, columns.controlled) for name in role]
+    # The columns that most episodes have are what is expected: the first may be the odd one.
+    usual = Counter(table.columns for _, table in tables).most_common(1)[0][0]
+    example = next(table for _, table in tables if table.columns == usual)
+    names = [name for role in pick_roles(example, columns.observed, columns.controlled) for name in role]
     episodes = []
     for name, table in tables:
         try:
@@ -50,13 +64,7 @@ def validate(
         except DataError as error:
             findings.append(Finding(name, None, None, FindingKind.UNREADABLE, str(error)))
     kinds = guess_quaternions(names, [values for _, _, values in episodes]) | columns.kinds
-    findings += check(episodes, make_channels(names, [], kinds=kinds))
-    if json_:
-        json.dump([{**asdict(f), "kind": f.kind.value, "severity": f.severity} for f in findings], sys.stdout, indent=1)
-        print()
-    else:
-        _print(findings, len(paths), len(names))
-    return CANNOT_BE_USED if any(f.severity == "error" for f in findings) else 0
+    return len(names), findings + check(episodes, make_channels(names, [], kinds=kinds))
 
 
 def _read(paths: Sequence[Path], columns: Columns) -> tuple[list[tuple[str, Table]], list[Finding]]:
@@ -65,28 +73,31 @@ def _read(paths: Sequence[Path], columns: Columns) -> tuple[list[tuple[str, Tabl
     for name, path in zip(episode_names(paths), paths, strict=True):
         try:
             tables.append((name, read_episode(path, time=columns.time, delimiter=columns.separator)))
-        except (DataError, ChannelError) as error:
+        except DataError as error:
             findings.append(Finding(name, None, None, FindingKind.UNREADABLE, str(error)))
     return tables, findings
 
 
 def _print(findings: Sequence[Finding], episodes: int, channels: int) -> None:
-    console = Console(highlight=False)
+    console = Output()
     table = PrintedTable(box=None, pad_edge=False)
-    for title in ("episode", "channel"):
-        table.add_column(title, no_wrap=True)
+    table.add_column("episode", overflow="fold", max_width=24)
+    table.add_column("channel", overflow="fold", max_width=20)
     table.add_column("at [s]", justify="right", no_wrap=True)
     table.add_column("finding", no_wrap=True)
-    table.add_column("", overflow="fold")
-    for finding in sorted(findings, key=lambda f: f.severity):
+    table.add_column()
+    for finding in findings:
         style = "red" if finding.severity == "error" else ""
         at = "" if finding.time is None else f"{finding.time:.3f}"
         table.add_row(finding.episode, finding.channel or "", at, finding.kind.value, finding.message, style=style)
     if findings:
-        console.print(table)
-    errors = len({f.episode for f in findings if f.severity == "error"})
-    warnings = len({f.episode for f in findings if f.severity == "warning"})
+        console.print(table, soft_wrap=False)
+    for severity, verdict in (("error", "cannot be used as it is"), ("warning", "is worth a look")):
+        kinds = Counter(finding.kind.value for finding in findings if finding.severity == severity)
+        if kinds:
+            console.print(f"{verdict}: " + ", ".join(f"{kind} {count}" for kind, count in kinds.most_common()))
+    count = len({finding.episode for finding in findings})
     console.print(
-        f"{episodes} episodes, {channels} channels: "
-        + (f"{errors} cannot be used as they are, {warnings} are worth a look" if findings else "nothing found")
+        f"{counted(episodes, 'episode')}, {counted(channels, 'channel')}: "
+        + (f"{count} with findings" if findings else "nothing found")
     )

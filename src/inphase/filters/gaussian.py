@@ -32,7 +32,8 @@ def innovation_score(innovation: Float[np.ndarray, " M"], cov: Float[np.ndarray,
     from scipy.linalg import solve_triangular
 
     white = solve_triangular(root, innovation, lower=True, check_finite=False)
-    surprise = float(white @ white)
+    with np.errstate(over="ignore", invalid="ignore"):  # an absurd reading is caught below
+        surprise = float(white @ white)
     log_det = 2 * float(np.log(np.diag(root)).sum())
     if not (np.isfinite(surprise) and np.isfinite(log_det)):
         return None

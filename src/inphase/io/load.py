@@ -95,7 +95,7 @@ def _demonstration(table: Table, names: Sequence[str]) -> Demonstration:
         sample, column = np.argwhere(np.isinf(values))[0]
         raise DataError(
             f"{table.name}: expected finite values or NaN, got {values[sample, column]} "
-            f"in channel {names[column]!r} at {table.times[sample]:g} s"
+            f"in channel {names[column]!r} at {table.times[sample]:.10g} s"
         )
     return Demonstration(table.times, values, table.name)
 

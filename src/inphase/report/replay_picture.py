@@ -1,101 +1,142 @@
-"""A picture of replays: what the partner's counterpart really did, what was answered, and how far it had come."""
+"""A picture of replays: what the controlled partner really did, what was answered, and how far it had come."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from jaxtyping import Float
 
-from inphase.errors import OptionError
+from inphase.errors import OptionError, listing
+from inphase.io.atomic import whole_file
 from inphase.model import Model
 from inphase.result import Estimate, Response
-from inphase.trajectory import Demonstration
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
+SUFFIXES = (".png", ".svg", ".pdf")
+CHANNELS = 4  # of a single replay
+ACROSS = 4  # columns; at most so many, or nothing can be read
 NINETY = 1.6449  # standard deviations on either side that hold 90 % of a Gaussian
-INK, NOW, PAST = "#22272e", "#0b6e99", "#9aa5b1"
+INK, NOW = "#22272e", "#0b6e99"
 PREVIEWS = ("#e9a23b", "#d1603d", "#8e3b46")
 
 
 @dataclass(frozen=True)
 class ReplayPanel:
-    """One replay to draw. now: a response of at least one sample for every estimate. previews: whole responses."""
+    """One replay to draw.
+
+    times: (T,) [s] from the first sample. phases: (T,) how far it really was. truth: (T, Dc) what the controlled
+    channels really read, NaN where that is not known. estimates, responses: T each, a response of at least one sample.
+    previews: whole responses by the share of the replay, 0 … 1, after which they were made.
+    """
 
     title: str
     model: Model
-    demonstration: Demonstration
+    times: Float[np.ndarray, " T"]
+    phases: Float[np.ndarray, " T"]
+    truth: Float[np.ndarray, "T Dc"]
     estimates: Sequence[Estimate]
-    now: Sequence[Response]
-    previews: Sequence[Response]
+    responses: Sequence[Response]
+    previews: Mapping[float, Response]
+
+
+def check_picture(path: str | PathLike[str]) -> None:
+    """Raise OptionError where no such picture can be drawn: before the work of which it is to tell."""
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError:
+        raise OptionError("pictures need matplotlib: pip install 'inphase[plot]'") from None
+    if Path(path).suffix.lower() not in SUFFIXES:
+        raise OptionError(f"unknown kind of picture {str(path)!r}; its name must end in {listing(SUFFIXES)}")
 
 
 def draw_replays(path: str | PathLike[str], panels: Sequence[ReplayPanel]) -> None:
-    """Draw replays side by side into a file (.png, .svg, .pdf): the busiest controlled channel, and the phase.
+    """Draw replays into a file (.png, .svg or .pdf), which is written whole or not at all.
 
-    Raises OptionError where matplotlib is not installed or the kind of file is unknown.
+    Raises OptionError where matplotlib is not installed, the kind of file is unknown, the folder does not exist or
+    there is no replay.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise OptionError("pictures need matplotlib: pip install 'inphase[plot]'") from None
-    figure = Figure(figsize=(1.2 + 3.6 * len(panels), 6.0), layout="constrained")
-    canvas = FigureCanvasAgg(figure)
-    if str(path).rsplit(".", 1)[-1] not in canvas.get_supported_filetypes():
-        raise OptionError(
-            f"unknown kind of picture {path}; one of {', '.join(sorted(canvas.get_supported_filetypes()))}"
-        )
-    axes = figure.subplots(2, len(panels), squeeze=False, sharex="col", gridspec_kw={"height_ratios": [3, 2]})
-    for column, panel in enumerate(panels):
-        _draw_response(axes[0, column], panel)
-        _draw_phase(axes[1, column], panel, first=column == 0)
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
-    figure.savefig(path, dpi=130)
+    check_picture(path)
+    if not panels:
+        raise OptionError("expected at least one replay to draw, got none")
+    figure = make_figure(panels)
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, dpi=130)
 
 
-def _draw_response(axes: Axes, panel: ReplayPanel) -> None:
-    model, count = panel.model, len(panel.model.observed)
-    mean, _ = model.distribution(np.linspace(0, 1, 100))
-    channel = int(np.argmax(np.ptp(mean[:, count:], axis=0) / model.spread[count:]))
-    name, unit = model.controlled[channel], model.channels[count + channel].unit
-    times = panel.demonstration.times - panel.demonstration.times[0]
-    origin = panel.demonstration.times[0]
-    now = np.array([[r.mean[0, channel], r.std[0, channel]] for r in panel.now])
-    axes.plot(times, panel.demonstration.values[:, count + channel], color=INK, lw=2.2, label=f"what {name} really did")
-    _band(axes, times, now[:, 0], now[:, 1], NOW, "response now, with its 90 % band")
-    for response, colour in zip(panel.previews, PREVIEWS, strict=False):
-        share = (response.times[0] - origin) / times[-1]
-        at = response.times - origin
-        label = f"rest, as foreseen at {100 * share:.0f} %"
+def make_figure(panels: Sequence[ReplayPanel]) -> Figure:
+    """The busiest controlled channel of every replay above its phase; of a single replay the four busiest."""
+    from matplotlib.figure import Figure
+
+    alone = len(panels) == 1
+    drawn = [(panel, channel) for panel in panels for channel in busiest(panel.model, CHANNELS if alone else 1)]
+    rows = -(-len(drawn) // ACROSS)
+    columns = -(-len(drawn) // rows)
+    figure = Figure(figsize=(max(7.7, 0.6 + 3.1 * columns), 0.6 + 5.0 * rows), layout="constrained")
+    grid = figure.add_gridspec(2 * rows, columns, height_ratios=[3, 2] * rows)
+    for i, (panel, channel) in enumerate(drawn):
+        row, column = divmod(i, columns)
+        axes = figure.add_subplot(grid[2 * row, column])
+        _draw_response(axes, panel, channel)
+        axes.set_title("" if alone else panel.title, fontsize=11)
+        if i == 0 or not alone:  # channels of one replay share its phase
+            below = figure.add_subplot(grid[2 * row + 1, :] if alone else grid[2 * row + 1, column], sharex=axes)
+            _draw_phase(below, panel)
+            below.set_ylabel("phase" if column == 0 else "")
+    figure.suptitle(panels[0].title if alone else "", fontsize=11)
+    entries: dict[str, Any] = {}
+    for axes in figure.axes:
+        entries |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    across = len(entries) if columns == ACROSS else 3
+    figure.legend([*entries.values()], [*entries], loc="outside lower center", ncols=across, frameon=False)
+    return figure
+
+
+def busiest(model: Model, most: int) -> list[int]:
+    """The controlled channels whose mean moves most, in units of their spread; in the order of the model."""
+    count = len(model.observed)
+    mean = model.predict(np.linspace(0, 1, 100))[:, count:]
+    ranks = np.argsort(-np.ptp(mean, axis=0) / model.spread[count:], kind="stable")
+    return sorted(ranks[:most].tolist())
+
+
+def _draw_response(axes: Axes, panel: ReplayPanel, channel: int) -> None:
+    name, unit = panel.model.controlled[channel], panel.model.channels[len(panel.model.observed) + channel].unit
+    times, truth = panel.times, panel.truth[:, channel]
+    mean, std = np.array([[r.mean[0, channel], r.std[0, channel]] for r in panel.responses]).T
+    if np.isfinite(truth).any():
+        axes.plot(times, truth, color=INK, lw=1.9, label="as recorded")
+    _band(axes, times, mean, std, "response now, with 90 % band")
+    begun = panel.estimates[0].time
+    for (share, response), colour in zip(panel.previews.items(), PREVIEWS, strict=False):
+        at = response.times - begun
+        label = f"rest, foreseen at {100 * share:.0f} %"
         axes.plot(at, response.mean[:, channel], color=colour, lw=1.6, ls="--", label=label)
         axes.plot(at[0], response.mean[0, channel], "o", color=colour, ms=5)
-    axes.set_title(panel.title, fontsize=11)
     axes.set_ylabel(f"{name} [{unit}]" if unit else name)
     axes.set_xlim(0, 1.15 * times[-1])
     _plain(axes)
 
 
-def _draw_phase(axes: Axes, panel: ReplayPanel, first: bool) -> None:
-    times = panel.demonstration.times - panel.demonstration.times[0]
+def _draw_phase(axes: Axes, panel: ReplayPanel) -> None:
     phases, stds = np.array([[e.phase, e.phase_std] for e in panel.estimates]).T
-    axes.plot(times, panel.demonstration.phases, color=INK, lw=2.2)
-    _band(axes, times, phases, stds, NOW, None)
+    axes.plot(panel.times, panel.phases, color=INK, lw=1.9)
+    _band(axes, panel.times, phases, stds, None)
     axes.set_ylim(-0.05, 1.05)
     axes.set_xlabel("time [s]")
-    if first:
-        axes.set_ylabel("phase")
     _plain(axes)
 
 
-def _band(axes: Axes, times: Any, mean: Any, std: Any, colour: str, label: str | None) -> None:
-    axes.fill_between(times, mean - NINETY * std, mean + NINETY * std, color=colour, alpha=0.22, lw=0)
-    axes.plot(times, mean, color=colour, lw=1.6, label=label)
+def _band(axes: Axes, times: Any, mean: Any, std: Any, label: str | None) -> None:
+    axes.fill_between(times, mean - NINETY * std, mean + NINETY * std, color=NOW, alpha=0.22, lw=0)
+    axes.plot(times, mean, color=NOW, lw=1.6, label=label)
 
 
 def _plain(axes: Axes) -> None:

@@ -8,14 +8,15 @@ import numpy as np
 
 from inphase.basis import Basis, Gaussian, Layout, Periodic
 from inphase.basis.fit import fit_weights, residuals
-from inphase.channels import spread
+from inphase.channels import Role, spread
 from inphase.errors import DataError, OptionError, listing
 from inphase.model import Model
 from inphase.noise import Noise
 from inphase.phase import PhaseModel
 from inphase.preprocess.coordinates import Coordinates
 from inphase.preprocess.scaling import Scaling
-from inphase.training.noise import learn_noise
+from inphase.training.discrepancy import held_out_noise
+from inphase.training.noise import both, regression_noise
 from inphase.training.tempo import learn_phase
 from inphase.trajectory import Dataset
 from inphase.weight_prior import WeightPrior
@@ -35,8 +36,9 @@ def fit(
     """Learn how two partners move together.
 
     Everything is learned from the data set but what is named: a basis for all channels or by channel name or pattern
-    (what is left out keeps the default), the scaling of the features, the prior over weights, the observation noise
-    in scaled units, the phase prior (`inphase.learn_phase` makes one of another order, or periodic).
+    (what is left out keeps the default), the scaling of the features, the prior over weights, the observation noise in
+    scaled units (else that of the regression, Eq. 2.15, and that of leaving each demonstration out), the phase prior
+    (`inphase.learn_phase` makes one of another order, or periodic).
     Raises DataError for fewer than two demonstrations, no controlled channel, or a channel that never moves;
     ChannelError for a pattern that fits nothing; OptionError for parts that do not fit each other.
     """
@@ -52,13 +54,19 @@ def fit(
     if len(scaling.low) != coordinates.count:
         raise OptionError(f"scaling: expected {coordinates.count} features, got {len(scaling.low)}")
     weights, _ = fit_weights(layout, phases, scaled, names=coordinates.names)
+    if noise is None:
+        shown = [dataset.channels[positions[0]].role is Role.OBSERVED for positions in coordinates.channel_of]
+        noise = both(
+            regression_noise(times, residuals(layout, phases, scaled, weights)),
+            held_out_noise(layout, weights, np.array(shown, dtype=np.float64), 1 / phase.nominal_velocity),
+        )
     return Model(
         channels=dataset.channels,
         coordinates=coordinates,
         scaling=scaling,
         layout=layout,
         prior=prior if prior is not None else WeightPrior(weights),
-        noise=noise if noise is not None else learn_noise(times, residuals(layout, phases, scaled, weights)),
+        noise=noise,
         phase=phase,
         spread=np.nanstd(np.concatenate(values), axis=0),
         provenance={**dataset.provenance, "demonstrations": str(len(dataset))},

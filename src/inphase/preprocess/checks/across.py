@@ -9,18 +9,19 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from inphase.arrays import IntArray
+from inphase.arrays import FloatArray, IntArray
 from inphase.channels import Channel, Kind
+from inphase.errors import DataError
 from inphase.preprocess.checks.clock import median_step
 from inphase.preprocess.checks.finding import EVERY_EPISODE, Finding, FindingKind
 from inphase.preprocess.checks.jumps import RADIANS, TAU
-from inphase.preprocess.checks.stillness import is_constant, spread_of
+from inphase.preprocess.checks.stillness import constant_columns, spread_of
 from inphase.trajectory import SHORTEST
 
-Episode: TypeAlias = tuple[str, Float[np.ndarray, " T"], Float[np.ndarray, "T D"]]
+Episode: TypeAlias = tuple[str, Float[np.ndarray, " _"], Float[np.ndarray, "_ D"]]
 
 LONGER = 2.0  # times the usual duration, or its inverse: people are not that much slower without a reason ...
-OUTLIER = 5.0  # ... unless durations vary so: standard deviations (1.4826 MAD) of their logarithm
+OUTLIER = 3.5  # ... unless durations vary so: standard deviations (1.4826 MAD) of their logarithm
 FASTER = 1.2  # times the usual sample rate, or its inverse
 UNITS = {1000.0: "millimetres and metres", 100.0: "centimetres and metres", 180 / np.pi: "degrees and radians"}
 UNIT_RATIO = 20.0  # of the spread and of the size of a group of channels, both: another unit
@@ -29,11 +30,23 @@ FURTHEST = 3  # ... and how many turns it may be
 
 
 def check_episodes(episodes: Sequence[Episode], channels: Sequence[Channel]) -> list[Finding]:
-    """What sets an episode apart from the others, and what is wrong with all: (name, times (T,) [s], values (T, D))."""
+    """What sets an episode apart from the others, and what is wrong with all: (name, times (T,) [s], values (T, D)).
+
+    Raises DataError where the shapes do not fit.
+    """
+    for episode in episodes:
+        check_shape(*episode, channels)
     usable = [episode for episode in episodes if len(episode[1]) >= SHORTEST]
     if len(usable) < 2:
         return []
-    return _clocks(usable) + _constant(usable, channels) + _units(usable, channels) + _branches(usable, channels)
+    with np.errstate(all="ignore"):  # the numbers may be anything
+        return _clocks(usable) + _constant(usable, channels) + _units(usable, channels) + _branches(usable, channels)
+
+
+def check_shape(name: str, times: FloatArray, values: FloatArray, channels: Sequence[Channel]) -> None:
+    """Raise DataError where times are not (T,) and values not (T, D)."""
+    if times.ndim != 1 or values.shape != (len(times), len(channels)):
+        raise DataError(f"{name}: expected {len(channels)} channels, got times {times.shape}, values {values.shape}")
 
 
 def _clocks(episodes: Sequence[Episode]) -> list[Finding]:
@@ -48,20 +61,21 @@ def _clocks(episodes: Sequence[Episode]) -> list[Finding]:
             message = f"lasts {duration:.4g} s, the others {duration / length:.4g} s (median)"
             findings.append(Finding(name, None, None, FindingKind.LENGTH, message))
         if abs(np.log(rate)) > np.log(FASTER):
-            message = f"{1 / step:.4g} samples a second, the others {1 / (step * rate):.4g} (median)"
+            message = f"{_rounded(1 / step)} samples a second, the others {_rounded(1 / (step * rate))} (median)"
             findings.append(Finding(name, None, None, FindingKind.CLOCK, message))
     return findings
 
 
 def _constant(episodes: Sequence[Episode], channels: Sequence[Channel]) -> list[Finding]:
     findings = []
-    for i, channel in enumerate(channels):
-        columns = [values[:, i] for _, _, values in episodes]
-        seen = [column[np.isfinite(column)] for column in columns if np.isfinite(column).any()]
-        if seen and all(is_constant(column) for column in columns if np.isfinite(column).any()):
-            levels = sorted({float(column[0]) for column in seen})
-            message = f"never moves: always {levels[0]:g}" + (f" to {levels[-1]:g}" if len(levels) > 1 else "")
-            findings.append(Finding(EVERY_EPISODE, channel.name, None, FindingKind.CONSTANT, message))
+    seen = np.array([np.isfinite(values).any(axis=0) for _, _, values in episodes])
+    constant = np.array([constant_columns(values) for _, _, values in episodes])
+    for i in map(int, np.flatnonzero(seen.any(axis=0) & (constant | ~seen).all(axis=0))):
+        channel = channels[i]
+        columns = [values[np.isfinite(values[:, i]), i] for _, _, values in episodes]
+        levels = sorted({float(column[0]) for column in columns if len(column)})
+        message = f"never moves: always {levels[0]:g}" + (f" to {levels[-1]:g}" if len(levels) > 1 else "")
+        findings.append(Finding(EVERY_EPISODE, channel.name, None, FindingKind.CONSTANT, message))
     return findings
 
 
@@ -87,19 +101,18 @@ def _branches(episodes: Sequence[Episode], channels: Sequence[Channel]) -> list[
     for i, channel in enumerate(channels):
         if channel.kind is Kind.QUATERNION or channel.unit not in RADIANS:
             continue
-        paths = {name: values[np.isfinite(values[:, i]), i] for name, _, values in episodes}
-        if channel.kind is Kind.ANGLE:
-            paths = {name: np.unwrap(path) for name, path in paths.items()}
-        middles = {name: float(np.median(path)) for name, path in paths.items() if len(path)}
-        turns = _turns(np.array(list(middles.values())))
+        seen = [(name, values[np.isfinite(values[:, i]), i]) for name, _, values in episodes]
+        paths = [(name, np.unwrap(path) if channel.kind is Kind.ANGLE else path) for name, path in seen if len(path)]
+        middles = np.array([np.median(path) for _, path in paths])
+        turns = _turns(middles)
         # Only what stays on one branch, and near it in every episode, is an angle for sure where no unit says so.
-        if turns is None or any(np.ptp(path) >= TAU for path in paths.values() if len(path)):
+        if turns is None or any(np.ptp(path) >= TAU for _, path in paths):
             continue
-        for name, turn in zip(middles, turns, strict=True):
+        for (name, _), middle, turn in zip(paths, middles, turns, strict=True):
             if turn:
                 others = int((turns == 0).sum())
                 side = "above" if turn > 0 else "below"
-                message = f"lies {abs(turn)} × 2π {side} {others} of the others: its median is {middles[name]:.3g} rad"
+                message = f"lies {abs(turn)} × 2π {side} {others} of the others: its median is {middle:.3g} rad"
                 findings.append(Finding(name, channel.name, None, FindingKind.BRANCH, message))
     return findings
 
@@ -122,6 +135,10 @@ def _ratios(amounts: ArrayLike) -> Float[np.ndarray, " E"]:
     known[~(np.isfinite(known) & (known > 0))] = np.nan
     present = np.sort(known[np.isfinite(known)])
     return known / present[len(present) // 2] if len(present) else known
+
+
+def _rounded(rate: float) -> str:
+    return f"{round(rate, 1):g}"
 
 
 def _duration(times: Float[np.ndarray, " T"]) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from inphase.preprocess.checks.finding import Finding, FindingKind, times_over
+from inphase.preprocess.checks.finding import Finding, FindingKind, clock, times_over
 from inphase.trajectory import SHORTEST
 
 SHORT = 20  # samples: below it a trajectory of ten basis functions is hardly determined
@@ -43,7 +43,7 @@ def _order(name: str, times: Float[np.ndarray, " T"]) -> list[Finding]:
     wrong = np.flatnonzero(np.diff(known) <= 0)
     if len(wrong):
         before, after = known[wrong[0]], known[wrong[0] + 1]
-        message = f"time does not increase {times_over(len(wrong))}: first {after:g} s comes after {before:g} s"
+        message = f"time does not increase {times_over(len(wrong))}: first {clock(after)} comes after {clock(before)}"
         findings.append(Finding(name, None, float(after), FindingKind.BACKWARDS, message))
     return findings
 
@@ -51,15 +51,14 @@ def _order(name: str, times: Float[np.ndarray, " T"]) -> list[Finding]:
 def _steps(name: str, times: Float[np.ndarray, " T"]) -> list[Finding]:
     median = median_step(times)
     steps = np.diff(times)
-    with np.errstate(invalid="ignore"):
-        gaps = np.flatnonzero(steps > GAP * median)
-        uneven = np.flatnonzero((steps > 0) & (steps <= GAP * median) & (np.abs(steps - median) > UNEVEN * median))
+    gaps = np.flatnonzero(np.isfinite(steps) & (steps > GAP * median))
+    uneven = np.flatnonzero((steps > 0) & (steps <= GAP * median) & (np.abs(steps - median) > UNEVEN * median))
     findings = []
     if len(gaps):
         longest = gaps[np.argmax(steps[gaps])]
         message = (
-            f"no sample for long {times_over(len(gaps))}, the longest from {times[longest]:g} s to "
-            f"{times[longest + 1]:g} s; the median step is {median:.4g} s"
+            f"no sample for long {times_over(len(gaps))}, the longest from {clock(times[longest])} to "
+            f"{clock(times[longest + 1])}; the median step is {median:.4g} s"
         )
         findings.append(Finding(name, None, float(times[gaps[0]]), FindingKind.GAP, message))
     if len(uneven) > UNEVEN_SHARE * len(steps):

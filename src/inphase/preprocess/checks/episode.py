@@ -8,8 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from inphase.channels import Channel
-from inphase.errors import DataError
-from inphase.preprocess.checks.across import Episode, check_episodes
+from inphase.preprocess.checks.across import Episode, check_episodes, check_shape
 from inphase.preprocess.checks.clock import check_clock
 from inphase.preprocess.checks.finding import EVERY_EPISODE, Finding
 from inphase.preprocess.checks.jumps import check_jumps
@@ -22,7 +21,8 @@ def check(episodes: Sequence[Episode], channels: Sequence[Channel]) -> list[Find
     """All that is wrong with a data set: every episode by itself, then what shows across them, each fault once."""
     across = check_episodes(episodes, channels)
     known = {(finding.channel, finding.kind) for finding in across if finding.episode == EVERY_EPISODE}
-    usual = usual_spreads([values for _, _, values in episodes], channels)
+    with np.errstate(all="ignore"):
+        usual = usual_spreads([values for _, _, values in episodes], channels)
     alone = [finding for episode in episodes for finding in check_episode(*episode, channels, usual)]
     return [finding for finding in alone if (finding.channel, finding.kind) not in known] + across
 
@@ -39,11 +39,11 @@ def check_episode(
     `usual` is how far each group of channels moves in the other episodes, by which jumps are judged where it is known.
     Raises DataError where the shapes do not fit.
     """
-    if times.ndim != 1 or values.shape != (len(times), len(channels)):
-        raise DataError(f"{name}: expected {len(channels)} channels, got times {times.shape}, values {values.shape}")
-    return [
-        *check_clock(name, times),
-        *check_values(name, times, values, channels),
-        *check_quaternions(name, times, values, channels),
-        *check_jumps(name, times, values, channels, usual),
-    ]
+    check_shape(name, times, values, channels)
+    with np.errstate(all="ignore"):  # the numbers may be anything
+        return [
+            *check_clock(name, times),
+            *check_values(name, times, values, channels),
+            *check_quaternions(name, times, values, channels),
+            *check_jumps(name, times, values, channels, usual),
+        ]

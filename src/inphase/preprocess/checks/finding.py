@@ -59,3 +59,8 @@ EVERY_EPISODE = "every episode"
 def times_over(count: int) -> str:
     """'once', 'twice', '7 times'."""
     return {1: "once", 2: "twice"}.get(count, f"{count} times")
+
+
+def clock(time: float) -> str:
+    """A time to read, '1.25 s': to a tenth of a millisecond, also where the clock counts from 1970."""
+    return f"{round(float(time), 4):.15g} s"

@@ -5,19 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from inphase.channels import Channel, Kind
 from inphase.preprocess.checks.clock import GAP, median_step
-from inphase.preprocess.checks.finding import Finding, FindingKind, times_over
+from inphase.preprocess.checks.finding import Finding, FindingKind, clock, times_over
 from inphase.preprocess.checks.stillness import is_switch, spread_of
 from inphase.preprocess.checks.tracks import Track, group_spreads, tracks
+from inphase.trajectory import SHORTEST
 
 TAU = 2 * np.pi
 SHARE = 0.4  # of how far the group moves: a smaller step is no jump ...
-ROTATION = 1.0  # of how far a quaternion moves, this much counts: 0.4 of it is 46 degrees, too much for one step
 OUTLIER = 10.0  # ... nor is one below this many standard deviations (1.4826 MAD) of the channel's steps ...
 SUDDEN = 0.5  # ... nor one of which more than this share continues the step before it or leads into the one after
+COUNTS = {Kind.ANGLE: 2.0, Kind.QUATERNION: 1.0}  # of how far these move, at most: 0.4 of it is a turn by 46 degrees
 TURN = 0.3  # [rad] a jump this close to a whole turn is one
 RADIANS = ("", "rad")  # units in which a channel may be an angle
 
@@ -37,26 +38,27 @@ def check_jumps(
     found = tracks(values, channels)
     spreads = group_spreads(found)
     for track in found:
-        if all(is_switch(values[:, i]) for i in track.columns):
+        if len(track.samples) < SHORTEST:
             continue
         # What hardly moves jumps within its noise; what counts is how far its group moves, here or in other episodes.
         spread = max(spreads[track.group], (usual or {}).get(track.group, 0.0))
         when = times[track.samples]
-        jumped = _sudden(when, track.path, spread if len(track.columns) == 1 else min(spread, ROTATION))
-        if len(track.columns) == 1:
-            channel = channels[track.columns[0]]
+        channel = channels[track.columns[0]]
+        kind = channel.kind if len(track.columns) == 1 else Kind.QUATERNION
+        jumped = _sudden(when, track.path, min(spread, COUNTS.get(kind, np.inf)))
+        if kind is not Kind.QUATERNION:
             turned = _turned(channel, when, values[track.samples, track.columns[0]])
             if turned.any():
                 findings.append(_turns(name, channel, when, turned))
-            jumped &= ~turned
-        findings += _jumped(name, track, when, spread, jumped)
+            if kind is Kind.LINEAR:
+                jumped &= ~turned
+        if jumped.any() and not all(is_switch(component) for component in track.path.T):
+            findings.append(_jumped(name, track, when, spread, np.flatnonzero(jumped) + 1))
     return findings
 
 
 def _sudden(times: Float[np.ndarray, " N"], path: Float[np.ndarray, "N C"], spread: float) -> Bool[np.ndarray, " N-1"]:
     """(N-1,) whether each step of the path is one that no smooth movement takes."""
-    if len(times) < 3:
-        return np.zeros(max(len(times) - 1, 0), dtype=bool)
     stretch, gap = _stretch(times)
     speeds = np.diff(path, axis=0) / stretch[:, None]
     sizes = np.linalg.norm(speeds, axis=1)
@@ -69,8 +71,7 @@ def _sudden(times: Float[np.ndarray, " N"], path: Float[np.ndarray, "N C"], spre
 
 def _stretch(times: Float[np.ndarray, " N"]) -> tuple[Float[np.ndarray, " N-1"], Bool[np.ndarray, " N-1"]]:
     """(N-1,) how many median steps each step lasts, at least 1, and whether it is a gap."""
-    with np.errstate(invalid="ignore"):
-        lasts = np.diff(times) / median_step(times)
+    lasts = np.diff(times) / median_step(times)
     lasts = np.where(np.isfinite(lasts), np.maximum(lasts, 1.0), 1.0)
     return lasts, np.asarray(lasts > GAP)
 
@@ -85,28 +86,24 @@ def _turned(
     if channel.unit not in RADIANS:
         return np.zeros(len(steps), dtype=bool)
     turns = np.round(steps / TAU)
-    return np.asarray(
-        (turns != 0) & (np.abs(steps - TAU * turns) < TURN) & _sudden(times, path[:, None], spread_of(path))
-    )
+    whole = (turns != 0) & (np.abs(steps - TAU * turns) < TURN)
+    return np.asarray(whole & _sudden(times, path[:, None], spread_of(path))) if whole.any() else whole
 
 
 def _turns(name: str, channel: Channel, times: Float[np.ndarray, " N"], turned: Bool[np.ndarray, " N-1"]) -> Finding:
     at = np.flatnonzero(turned) + 1
     cure = "it is unwrapped" if channel.kind is Kind.ANGLE else f"kinds={{{channel.name!r}: 'angle'}} unwraps it"
-    message = f"jumps by a whole turn (2π) {times_over(len(at))}, first at {times[at[0]]:g} s; {cure}"
+    message = f"jumps by a whole turn (2π) {times_over(len(at))}, first at {clock(times[at[0]])}; {cure}"
     return Finding(name, channel.name, float(times[at[0]]), FindingKind.BRANCH, message)
 
 
 def _jumped(
-    name: str, track: Track, times: Float[np.ndarray, " N"], spread: float, jumped: Bool[np.ndarray, " N-1"]
-) -> list[Finding]:
-    at = np.flatnonzero(jumped) + 1
-    if not len(at):
-        return []
+    name: str, track: Track, times: Float[np.ndarray, " N"], spread: float, at: Int[np.ndarray, " J"]
+) -> Finding:
     sizes = np.linalg.norm(track.path[at] - track.path[at - 1], axis=1)
     largest = int(np.argmax(sizes))
     message = (
-        f"jumps {times_over(len(at))}, furthest by {sizes[largest]:.3g} at {times[at[largest]]:g} s; "
+        f"jumps {times_over(len(at))}, furthest by {sizes[largest]:.3g} at {clock(times[at[largest]])}; "
         f"all of its movement spans {spread:.3g}"
     )
-    return [Finding(name, track.name, float(times[at[0]]), FindingKind.JUMP, message)]
+    return Finding(name, track.name, float(times[at[0]]), FindingKind.JUMP, message)

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from inphase.channels import Channel, Kind, group_of, quaternions
-from inphase.preprocess.checks.finding import Finding, FindingKind, times_over
+from inphase.preprocess.checks.finding import Finding, FindingKind, clock, times_over
 from inphase.trajectory import QUATERNION_NORM
 
 OFF_NORM = 0.01  # from 1: more than files round away
@@ -24,13 +24,15 @@ def check_quaternions(
         path, when = values[seen][:, columns], times[seen]
         flips = np.flatnonzero((path[1:] * path[:-1]).sum(axis=1) < 0) + 1
         if len(flips):
-            message = f"changes sign {times_over(len(flips))}, first at {when[flips[0]]:g} s: q and -q are one rotation"
+            message = (
+                f"changes sign {times_over(len(flips))}, first at {clock(when[flips[0]])}: q and -q are one rotation"
+            )
             findings.append(Finding(name, group, float(when[flips[0]]), FindingKind.SIGN_FLIP, message))
         norms = np.linalg.norm(path, axis=1)
         off = np.flatnonzero(np.abs(norms - 1) > OFF_NORM)
         if len(off):
             worst = off[np.argmax(np.abs(norms[off] - 1))]
-            message = f"expected norm 1, got {norms[worst]:.3g} at {when[worst]:g} s ({len(off)} samples are off)"
+            message = f"expected norm 1, got {norms[worst]:.3g} at {clock(when[worst])} ({len(off)} samples are off)"
             findings.append(Finding(name, group, float(when[off[0]]), FindingKind.NORM, message))
     return findings
 

@@ -42,11 +42,12 @@ def tracks(values: Float[np.ndarray, "T D"], channels: Sequence[Channel]) -> lis
     for i, channel in enumerate(channels):
         if i in group_at:
             columns = quaternions[group_at[i]]
-            seen = _seen(values[:, columns])
-            path = sign_continuous(values[seen][:, columns])
+            norms = np.linalg.norm(values[:, columns], axis=1)
+            seen = np.flatnonzero(np.isfinite(norms) & (norms > 0))  # a wrong norm is no jump
+            path = sign_continuous(values[seen][:, columns] / norms[seen, None])
             found.append(Track(group_at[i], group_at[i], tuple(columns), seen, path))
         elif i not in inside:
-            seen = _seen(values[:, [i]])
+            seen = np.flatnonzero(np.isfinite(values[:, i]))
             path = values[seen, i]
             path = np.unwrap(path) if channel.kind is Kind.ANGLE else path
             found.append(Track(channel.name, channel.group, (i,), seen, path[:, None]))
@@ -66,7 +67,3 @@ def usual_spreads(values: Sequence[Float[np.ndarray, "_ D"]], channels: Sequence
     each = [group_spreads(tracks(episode, channels)) for episode in values]
     groups = {group for spreads in each for group in spreads}
     return {group: float(np.median([spreads[group] for spreads in each if group in spreads])) for group in groups}
-
-
-def _seen(columns: Float[np.ndarray, "T C"]) -> Int[np.ndarray, " N"]:
-    return np.flatnonzero(np.isfinite(columns).all(axis=1))

@@ -1,0 +1,55 @@
+"""Where the commands print, and a sign of life where they take long."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+
+PATIENCE = 1.0  # [s] before a command that says nothing says what it does
+WIDE = 160  # columns where nobody looks: a row stays on its line, for those who search
+
+
+class Output(Console):
+    """A console that prints what it is given as it is: names may hold brackets and colons. Lines are not broken.
+
+    A closed pipe raises, as it does for `print`.
+    """
+
+    def __init__(self, quiet: bool = False, stderr: bool = False) -> None:
+        looked_at = (sys.stderr if stderr else sys.stdout).isatty() or "COLUMNS" in os.environ
+        width = None if looked_at else WIDE
+        super().__init__(
+            quiet=quiet, stderr=stderr, width=width, highlight=False, markup=False, emoji=False, soft_wrap=True
+        )
+
+    def on_broken_pipe(self) -> None:
+        """Leave it to `main`."""
+        raise BrokenPipeError
+
+
+def counted(number: int, thing: str) -> str:
+    """'1 episode', '2 episodes'."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+
+
+@contextmanager
+def waiting(what: str) -> Iterator[None]:
+    """Say on standard error, if that is a terminal, what is being done once it has taken more than a second."""
+    console = Output(stderr=True)
+    if not console.is_terminal:
+        yield
+        return
+    status = console.status(f"{what} …")
+    timer = threading.Timer(PATIENCE, status.start)
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()  # it may be about to start
+        status.stop()

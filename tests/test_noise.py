@@ -1,0 +1,166 @@
+"""Noise: how much a reading tells after another, and what is learned of that from residuals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from interactions import shapes_unchecked, wobble
+
+import inphase
+from inphase.errors import OptionError
+from inphase.noise import Noise
+
+GAPS = st.lists(st.floats(1e-3, 50.0), min_size=0, max_size=30).map(np.array)
+
+
+def information(gaps: np.ndarray, var: float, correlation_time: float) -> float:
+    """1ᵀ C⁻¹ 1: how precisely samples of an AR(1) process, that far apart, tell the constant they lie around."""
+    times = np.concatenate([[0.0], np.cumsum(gaps)])
+    cov = var * np.exp(-np.abs(times[:, None] - times) / correlation_time)
+    return float(np.linalg.solve(cov, np.ones(len(times))).sum())
+
+
+def added_up(gaps: np.ndarray, noise: Noise) -> float:
+    """The same, as a filter adds it up: 1 / R, sample by sample."""
+    return sum(float(1 / noise.at(np.array([gap]))[0]) for gap in [np.inf, *gaps])
+
+
+# The share tanh(gap / 2τ) follows from the Cholesky factor of the covariance, whatever the gaps: the law is exact. What
+# is lost to rounding is what solving a 30 × 30 covariance with neighbours correlated at exp(-0.001) loses.
+@given(GAPS, st.floats(0.01, 100.0), st.floats(0.02, 5.0))
+def test_readings_add_up_to_the_information_of_a_correlated_process(gaps: np.ndarray, var: float, time: float) -> None:
+    noise = Noise(np.array([var]), np.array([time]))
+    assert added_up(gaps, noise) == pytest.approx(information(gaps, var, time), rel=1e-9)
+
+
+@given(st.integers(1, 40), st.floats(1e-3, 1.0), st.floats(0.02, 5.0))
+def test_even_samples_tell_what_they_should(count: int, dt: float, time: float) -> None:
+    noise, gaps = Noise(np.array([2.0]), np.array([time])), np.full(count - 1, dt)
+    assert added_up(gaps, noise) == pytest.approx(information(gaps, 2.0, time), rel=1e-9)
+
+
+def test_a_stretch_of_time_tells_the_same_at_any_rate() -> None:
+    # T seconds about a constant tell (1 + T / 2τ) / var, however fast they are sampled, once that is faster than τ.
+    noise = Noise(np.array([1.0]), np.array([0.2]))
+    for count in (100, 400):
+        assert added_up(np.full(count, 2.0 / count), noise) == pytest.approx(1 + 2.0 / 0.4, rel=1e-3)
+
+
+@given(st.floats(0.0, 1e6) | st.just(np.inf), st.floats(1e-6, 1e6))
+def test_every_reading_of_white_noise_is_new(interval: float, var: float) -> None:
+    noise = Noise(np.array([var]), np.zeros(1))
+    np.testing.assert_array_equal(noise.at(np.array([interval])), [var])
+
+
+@given(st.floats(1e-6, 1e6), st.floats(1e-6, 1e6))
+def test_a_repeat_at_once_tells_nothing_and_the_first_all(var: float, time: float) -> None:
+    noise = Noise(np.array([var, var]), np.array([time, time]))
+    np.testing.assert_array_equal(noise.at(np.array([0.0, np.inf])), [np.inf, var])
+
+
+@given(st.floats(0, 1e9), st.floats(1e-9, 1e9))
+def test_no_gap_and_no_time_makes_trouble(interval: float, time: float) -> None:
+    at = Noise(np.array([1.0]), np.array([time])).at(np.array([interval]))
+    assert at[0] >= 1.0  # and no warning on the way to infinity
+
+
+def test_features_do_not_know_each_other() -> None:
+    noise = Noise(np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.1, 0.3]))
+    intervals = np.array([0.05, np.inf, 0.2])
+    alone = [Noise(noise.var[[i]], noise.correlation_time[[i]]).at(intervals[[i]])[0] for i in range(3)]
+    np.testing.assert_array_equal(noise.at(intervals), alone)
+    np.testing.assert_array_equal(intervals, [0.05, np.inf, 0.2])
+
+
+@pytest.mark.parametrize(
+    ("var", "time"),
+    [
+        ([0.0], [0.0]),
+        ([-1.0], [0.0]),
+        ([np.nan], [0.0]),
+        ([np.inf], [0.0]),
+        ([1.0], [-0.1]),
+        ([1.0], [np.nan]),
+        ([1.0], [np.inf]),
+        ([1.0, 1.0], [0.0]),
+        ([[1.0]], [[0.0]]),
+    ],
+)
+def test_what_is_no_noise_is_refused(var: list, time: list) -> None:
+    with shapes_unchecked(), pytest.raises(OptionError, match="expected"):
+        Noise(np.array(var), np.array(time))
+
+
+def test_noise_is_read_only() -> None:
+    noise = Noise(np.ones(2), np.ones(2))
+    for array in (noise.var, noise.correlation_time):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0.0
+
+
+def test_the_variance_is_the_mean_over_demonstrations(rng: np.random.Generator) -> None:
+    residuals = [rng.normal(size=(n, 3)) for n in (5, 50, 20)]
+    learned = inphase.learn_noise([np.arange(len(r)) * 0.01 for r in residuals], residuals)
+    np.testing.assert_allclose(learned.var, np.mean([(r**2).mean(0) for r in residuals], axis=0))  # Eq. 2.15
+
+
+def test_white_residuals_are_white(rng: np.random.Generator) -> None:
+    times, stds = [np.arange(1000) * 0.02] * 6, np.array([0.1, 1.0, 5.0])
+    learned = inphase.learn_noise(times, [wobble(t, 3, 1.0, 0.0, rng) * stds for t in times])
+    # A variance from n draws is off by sqrt(2 / n); a correlation that is nothing by 1 / sqrt(1000) of a step.
+    np.testing.assert_allclose(learned.var, stds**2, rtol=4 * np.sqrt(2 / 6000))
+    assert (learned.correlation_time < 0.02 * 4 / np.sqrt(1000)).all()
+
+
+@pytest.mark.parametrize("rate", [25.0, 50.0, 100.0])
+def test_correlated_residuals_are_as_long_at_any_rate(rate: float, rng: np.random.Generator) -> None:
+    times = [np.arange(round(60 * rate)) / rate] * 6
+    learned = inphase.learn_noise(times, [wobble(t, 3, 0.5, 0.2, rng) for t in times])
+    # Six minutes hold about 6 · 60 / (2 · 0.2) = 900 independent samples: sqrt(2 / 900) = 5 % for the variance. The
+    # sum of correlations is cut where they drown in chance, and starts half a step late: a quarter may be missing.
+    np.testing.assert_allclose(learned.var, 0.25, rtol=0.2)
+    np.testing.assert_allclose(learned.correlation_time, 0.2, rtol=0.3)
+
+
+@pytest.mark.parametrize("pattern", ["a sensor at a third of the rate", "half the samples lost", "one long gap"])
+def test_what_was_not_seen_changes_little(pattern: str, rng: np.random.Generator) -> None:
+    times = [np.arange(6000) * 0.01] * 6
+    residuals = [wobble(t, 2, 0.5, 0.2, rng) for t in times]
+    for r in residuals:
+        if pattern == "a sensor at a third of the rate":
+            r[np.arange(len(r)) % 3 > 0, 1] = np.nan
+        elif pattern == "half the samples lost":
+            r[rng.random(len(r)) < 0.5, 1] = np.nan
+        else:
+            r[1000:4000, 1] = np.nan
+    learned = inphase.learn_noise(times, residuals)
+    np.testing.assert_allclose(learned.var, 0.25, rtol=0.2)
+    np.testing.assert_allclose(learned.correlation_time, 0.2, rtol=0.3)
+
+
+def test_a_demonstration_without_the_channel_has_no_say(rng: np.random.Generator) -> None:
+    times = [np.arange(1000) * 0.02] * 4
+    residuals = [wobble(t, 2, 0.5, 0.2, rng) for t in times]
+    expected = inphase.learn_noise(times[:2], residuals[:2])
+    for r in residuals[2:]:
+        r[:, 0] = np.nan
+    learned = inphase.learn_noise(times, residuals)
+    np.testing.assert_allclose(learned.var[0], expected.var[0], rtol=1e-12)
+    np.testing.assert_allclose(learned.correlation_time[0], expected.correlation_time[0], rtol=1e-12)
+
+
+def test_no_residual_is_taken_for_no_noise() -> None:
+    times = [np.arange(10) * 0.1] * 2
+    learned = inphase.learn_noise(times, [np.zeros((10, 1))] * 2)
+    assert 0 < learned.var[0] < 1e-6
+    assert learned.correlation_time[0] == 0
+
+
+def test_residuals_are_not_changed(rng: np.random.Generator) -> None:
+    times, residuals = [np.arange(20) * 0.1], [rng.normal(size=(20, 2))]
+    residuals[0][3] = np.nan
+    before = residuals[0].copy()
+    inphase.learn_noise(times, residuals)
+    np.testing.assert_array_equal(residuals[0], before)

@@ -1,0 +1,138 @@
+"""Weight prior: the Gaussian of the demonstrations, in as few directions as they span."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from interactions import shapes_unchecked
+
+from inphase.errors import OptionError
+from inphase.weight_prior import WeightPrior
+
+COUNTS = st.integers(2, 9)
+SIZES = st.integers(1, 12)
+SEEDS = st.integers(0, 2**32 - 1)
+SHARES = st.floats(0.0, 1.0)
+
+
+def samples(count: int, size: int, seed: int) -> np.ndarray:
+    """Weights (count, size), every one of another magnitude, as those of unlike channels are."""
+    rng = np.random.default_rng(seed)
+    return rng.normal(size=size) + rng.normal(size=(count, size)) * 10.0 ** rng.uniform(-2, 2, size)
+
+
+def sample_cov(rows: np.ndarray) -> np.ndarray:
+    return np.cov(rows, rowvar=False).reshape(rows.shape[1], rows.shape[1])
+
+
+def in_proportion(got: np.ndarray, expected: np.ndarray) -> np.ndarray:
+    """The difference of two covariances as a share of the standard deviations it lies between."""
+    stds = np.sqrt(np.diag(expected))
+    return np.abs(got - expected) / np.outer(stds, stds)
+
+
+@given(COUNTS, SIZES, SEEDS)
+def test_the_factor_squared_is_the_sample_covariance(count: int, size: int, seed: int) -> None:
+    rows = samples(count, size, seed)
+    prior, expected = WeightPrior(rows), sample_cov(rows)
+    # Directions below 1e-10 of the largest are dropped: of weights that are 1e-4 of another, (1e-6)² of the variance.
+    assert in_proportion(prior.factor.T @ prior.factor, expected).max() < 1e-9
+    np.testing.assert_allclose(prior.cov, expected, atol=1e-12 * np.abs(expected).max())
+    np.testing.assert_allclose(prior.mean, rows.mean(0))
+
+
+@given(COUNTS, SIZES, SEEDS)
+def test_there_are_fewer_directions_than_demonstrations(count: int, size: int, seed: int) -> None:
+    assert len(WeightPrior(samples(count, size, seed)).factor) <= min(count - 1, size)
+
+
+@given(COUNTS, SIZES, SEEDS, SHARES)
+def test_shrinking_keeps_variances_and_takes_a_share_of_the_rest(
+    count: int, size: int, seed: int, shrinkage: float
+) -> None:
+    rows = samples(count, size, seed)
+    whole = sample_cov(rows)
+    expected = (1 - shrinkage) * whole + shrinkage * np.diag(np.diag(whole))
+    assert in_proportion(WeightPrior(rows, shrinkage).cov, expected).max() < 1e-9
+
+
+def test_without_demonstrations_that_differ_there_is_no_spread() -> None:
+    prior = WeightPrior(np.ones((3, 4)), 0.5)
+    np.testing.assert_array_equal(prior.cov, np.zeros((4, 4)))
+    np.testing.assert_array_equal(prior.draw(2, np.random.default_rng(0)), np.ones((2, 4)))
+
+
+@pytest.mark.parametrize("shrinkage", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("count", [2, 3, 20])
+def test_draws_have_the_mean_and_covariance(count: int, shrinkage: float, rng: np.random.Generator) -> None:
+    prior, draws = WeightPrior(samples(count, 5, 3), shrinkage), 20_000
+    drawn = prior.draw(draws, rng)
+    variances = np.diag(prior.cov)
+    # 4.5 standard errors of a mean, and of a covariance: sqrt((Σii Σjj + Σij²) / n).
+    assert (np.abs(drawn.mean(0) - prior.mean) < 4.5 * np.sqrt(variances / draws) + 1e-12).all()
+    tolerance = 4.5 * np.sqrt((np.outer(variances, variances) + prior.cov**2) / draws)
+    assert (np.abs(np.cov(drawn, rowvar=False) - prior.cov) < tolerance).all()
+
+
+def test_two_demonstrations_draw_on_the_line_between_them(rng: np.random.Generator) -> None:
+    rows = samples(2, 6, 1)
+    along = rows[1] - rows[0]
+    off = WeightPrior(rows).draw(50, rng) - rows[0]
+    off = off - np.outer(off @ along / (along @ along), along)
+    assert np.abs(off).max() < 1e-12 * np.abs(rows).max()
+
+
+@given(COUNTS, st.integers(1, 60), SEEDS)
+def test_every_demonstration_is_taken_as_often_as_any_other(count: int, wanted: int, seed: int) -> None:
+    rows = samples(count, 3, seed)
+    taken = WeightPrior(rows).resample(wanted, np.random.default_rng(seed))
+    times = np.array([(taken == row).all(axis=1).sum() for row in rows])
+    assert taken.shape == (wanted, 3)
+    assert times.sum() == wanted
+    assert times.max() - times.min() <= 1
+
+
+def test_the_odd_ones_out_are_drawn_by_lot() -> None:
+    prior = WeightPrior(np.arange(8.0)[:, None])
+    firsts = {float(prior.resample(1, np.random.default_rng(seed))[0, 0]) for seed in range(200)}
+    assert len(firsts) == 8  # each is left out 200 times with probability (7/8)²⁰⁰ < 1e-11
+
+
+@given(COUNTS, SIZES, SEEDS)
+def test_drawing_takes_nothing_but_the_seed(count: int, size: int, seed: int) -> None:
+    prior = WeightPrior(samples(count, size, seed), 0.3)
+    for method in (prior.draw, prior.resample):
+        again = (method(7, np.random.default_rng(seed)) for _ in range(2))
+        np.testing.assert_array_equal(*again)
+
+
+@pytest.mark.parametrize(
+    ("rows", "shrinkage"),
+    [
+        (np.ones((1, 3)), 0.0),
+        (np.ones((0, 3)), 0.0),
+        (np.ones(3), 0.0),
+        (np.array([[1.0, np.nan], [0.0, 0.0]]), 0.0),
+        (np.array([[1.0, np.inf], [0.0, 0.0]]), 0.0),
+        (np.ones((2, 3)), -0.1),
+        (np.ones((2, 3)), 1.1),
+        (np.ones((2, 3)), np.nan),
+    ],
+)
+def test_what_is_no_prior_is_refused(rows: np.ndarray, shrinkage: float) -> None:
+    with shapes_unchecked(), pytest.raises(OptionError, match="expected"):
+        WeightPrior(rows, shrinkage)
+
+
+def test_a_prior_is_read_only_and_its_own() -> None:
+    rows = samples(4, 3, 0)
+    prior, mean = WeightPrior(rows), rows.mean(0)
+    rows[:] = 0.0
+    np.testing.assert_array_equal(prior.mean, mean)
+    for array in (prior.samples, prior.mean, prior.factor):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0.0
+    prior.cov[:] = 0.0  # the caller's own
+    assert prior.cov.any()
