@@ -37,15 +37,21 @@ PUBLIC = [
     "Kind",
     "Model",
     "ModelFileError",
+    "Noise",
     "ObservationError",
     "OptionError",
+    "PhaseModel",
     "Response",
     "Role",
+    "Scaling",
     "Session",
     "Status",
+    "WeightPrior",
     "basis",
     "fit",
+    "learn_phase",
     "load",
+    "trim",
 ]
 PUBLIC_PACKAGES = ["inphase.basis"]
 

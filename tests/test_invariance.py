@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pytest
-from interactions import CONTROLLED, OBSERVED, dataset, known_phase, recording
+from interactions import CONTROLLED, NOISE_STD, OBSERVED, dataset, known_phase, recording
 from scipy.spatial.transform import Rotation
 
 import inphase
@@ -87,7 +87,10 @@ def test_a_channel_that_is_never_seen_need_not_be_there(
     kept = [channel for channel in ALL if channel != gone]
     shown = [channel for channel in ("reach", "lift", "turn") if channel != gone]
     samples = named(values, shown)
-    reduced = follow(inphase.fit(only(demos, kept)), times, samples, name)
+    # What noise is learned by holding out demonstrations depends on what else explains them: both get the same.
+    rows = [ALL.index(channel) for channel in kept]
+    noise = Noise(model.noise.var[rows], model.noise.correlation_time[rows])
+    reduced = follow(inphase.fit(only(demos, kept), noise=noise), times, samples, name)
     if how == "NaN":
         samples = [sample | {gone: np.nan} for sample in samples]
     whole = follow(model, times, samples, name)
@@ -102,7 +105,9 @@ def test_the_noise_of_a_channel_that_is_never_seen_is_never_asked(
     name: str, var: float, time: float, model: inphase.Model, live: tuple
 ) -> None:
     times, values = live
-    garbage = [np.where(np.arange(4) == 1, g, own) for g, own in ((var, model.noise.var), (time, model.noise.correlation_time))]
+    garbage = [
+        np.where(np.arange(4) == 1, g, own) for g, own in ((var, model.noise.var), (time, model.noise.correlation_time))
+    ]
     other = dataclasses.replace(model, noise=Noise(*garbage))
     (one, estimates, scores), (two, others, other_scores) = (
         follow(m, times, named(values, ["reach"]), name) for m in (model, other)
@@ -146,7 +151,9 @@ def test_units_scale_what_is_answered_and_nothing_else(
         [d.times for d in demos], [d.values * factors + offsets for d in demos], OBSERVED, CONTROLLED
     )
     one, estimates, scores = follow(model, times, named(values, ALL[:3]), name)
-    two, others, other_scores = follow(inphase.fit(other_demos), times, named(values * factors + offsets, ALL[:3]), name)
+    two, others, other_scores = follow(
+        inphase.fit(other_demos), times, named(values * factors + offsets, ALL[:3]), name
+    )
     same(others, estimates)
     # A density per millimetre is a thousandth of one per metre: one factor for each reading.
     same(other_scores, scores - np.log(1000.0 * 100.0))
@@ -176,31 +183,34 @@ def test_a_sample_in_two_is_nearly_the_whole_sample_where_the_phase_is_not_known
     name: str, model: inphase.Model, live: tuple
 ) -> None:
     times, values = live
-    options = {"members": 500} if name == "ebip" else {}
+    options = {"members": 2000} if name == "ebip" else {}
     _, once, _ = follow(model, times, named(values, OBSERVED), name, **options)
     halves = [sample for row in named(values, OBSERVED) for sample in ({"lift": row["lift"]}, {"reach": row["reach"]})]
     _, twice, _ = follow(model, np.repeat(times, 2), halves, name, **options)
     # What is left is where the observation function is linearised, and chance.
-    assert (np.abs(twice[1::2, 0] - once[:, 0]) < 0.4 * once[:, 1]).all()
+    assert (np.abs(twice[1::2, 0] - once[:, 0]) < 0.3 * once[:, 1]).all()
 
 
-@NAMES
+@pytest.mark.parametrize("learned", [True, False], ids=["noise learned", "noise known"])
 @pytest.mark.parametrize("seed", [1, 2])
-def test_the_rate_of_a_recording_does_not_matter(name: str, seed: int) -> None:
+@NAMES
+def test_the_rate_of_a_recording_does_not_matter(name: str, seed: int, learned: bool) -> None:
     rng = np.random.default_rng(seed)
     model = inphase.fit(dataset(rng, duration=1.0, rate=120.0, correlation_time=0.06))
+    if not learned:
+        model = dataclasses.replace(model, noise=Noise((NOISE_STD / model.scaling.span) ** 2, np.full(4, 0.06)))
     times, values = recording(rng, duration=1.1, rate=120.0, correlation_time=0.06)
     options = {"members": 400} if name == "ebip" else {}
     at = {step: follow(model, times[::step], list(values[::step, :2]), name, **options)[1] for step in (1, 2, 4)}
     fastest = at[1][::4]
     for step in (2, 4):
         slower = at[step][:: 4 // step]
-        assert (np.abs(slower[:, 0] - fastest[:, 0]) < np.minimum(slower[:, 1], fastest[:, 1])).all()
-        # As sure of itself, too: four times the samples do not make twice the certainty. At first they do tell more.
-        ratio = (slower / fastest)[10:, [1, 3]]
-        assert ((ratio > 0.6) & (ratio < 1.7)).all()
+        assert (np.abs(slower[:, 0] - fastest[:, 0]) <= np.minimum(slower[:, 1], fastest[:, 1])).all()
+        # As sure of itself, too: four times the samples do not make twice the certainty.
+        ratio = slower[10:, [1, 3]] / fastest[10:, [1, 3]]
+        assert ((ratio > 0.75) & (ratio < 1.33)).all()
     truth = times[::4] / times[-1]
-    assert np.abs(fastest[:, 0] - truth).max() < 0.12
+    assert np.abs(fastest[:, 0] - truth).max() < 0.1
 
 
 @NAMES
@@ -237,9 +247,7 @@ def rotation(rng: np.random.Generator, rate: float = RATE) -> tuple[np.ndarray, 
 
 
 def turning(recordings: Sequence[tuple[np.ndarray, np.ndarray]]) -> inphase.Dataset:
-    return inphase.Dataset.from_arrays(
-        [t for t, _ in recordings], [v for _, v in recordings], HAND, ROBOT, kinds=KINDS
-    )
+    return inphase.Dataset.from_arrays([t for t, _ in recordings], [v for _, v in recordings], HAND, ROBOT, kinds=KINDS)
 
 
 @pytest.fixture(scope="module")
@@ -268,7 +276,9 @@ def test_the_sign_of_a_quaternion_changes_nothing(name: str, turns: list, rng: n
     flipped = [(t, v * np.concatenate([[1], np.full(4, rng.choice([-1, 1])), [1, 1]])) for t, v in turns]
     model, other = inphase.fit(turning(turns)), inphase.fit(turning(flipped))
     one, estimates, scores = follow(model, times, list(values[:, :5]), name)
-    two, others, other_scores = follow(model, times, [np.concatenate([v[:1], s * v[1:5]]) for v, s in zip(values, signs, strict=True)], name)
+    two, others, other_scores = follow(
+        model, times, [np.concatenate([v[:1], s * v[1:5]]) for v, s in zip(values, signs, strict=True)], name
+    )
     np.testing.assert_array_equal(others, estimates)
     np.testing.assert_array_equal(other_scores, scores)
     np.testing.assert_array_equal(two.respond().mean, one.respond().mean)

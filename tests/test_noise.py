@@ -8,9 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from interactions import shapes_unchecked, wobble
 
-import inphase
+from inphase.basis import Gaussian, Layout, Polynomial
 from inphase.errors import OptionError
 from inphase.noise import Noise
+from inphase.training.discrepancy import held_out_noise
+from inphase.training.noise import both, regression_noise
 
 GAPS = st.lists(st.floats(1e-3, 50.0), min_size=0, max_size=30).map(np.array)
 
@@ -102,13 +104,13 @@ def test_noise_is_read_only() -> None:
 
 def test_the_variance_is_the_mean_over_demonstrations(rng: np.random.Generator) -> None:
     residuals = [rng.normal(size=(n, 3)) for n in (5, 50, 20)]
-    learned = inphase.learn_noise([np.arange(len(r)) * 0.01 for r in residuals], residuals)
+    learned = regression_noise([np.arange(len(r)) * 0.01 for r in residuals], residuals)
     np.testing.assert_allclose(learned.var, np.mean([(r**2).mean(0) for r in residuals], axis=0))  # Eq. 2.15
 
 
 def test_white_residuals_are_white(rng: np.random.Generator) -> None:
     times, stds = [np.arange(1000) * 0.02] * 6, np.array([0.1, 1.0, 5.0])
-    learned = inphase.learn_noise(times, [wobble(t, 3, 1.0, 0.0, rng) * stds for t in times])
+    learned = regression_noise(times, [wobble(t, 3, 1.0, 0.0, rng) * stds for t in times])
     # A variance from n draws is off by sqrt(2 / n); a correlation that is nothing by 1 / sqrt(1000) of a step.
     np.testing.assert_allclose(learned.var, stds**2, rtol=4 * np.sqrt(2 / 6000))
     assert (learned.correlation_time < 0.02 * 4 / np.sqrt(1000)).all()
@@ -117,7 +119,7 @@ def test_white_residuals_are_white(rng: np.random.Generator) -> None:
 @pytest.mark.parametrize("rate", [25.0, 50.0, 100.0])
 def test_correlated_residuals_are_as_long_at_any_rate(rate: float, rng: np.random.Generator) -> None:
     times = [np.arange(round(60 * rate)) / rate] * 6
-    learned = inphase.learn_noise(times, [wobble(t, 3, 0.5, 0.2, rng) for t in times])
+    learned = regression_noise(times, [wobble(t, 3, 0.5, 0.2, rng) for t in times])
     # Six minutes hold about 6 · 60 / (2 · 0.2) = 900 independent samples: sqrt(2 / 900) = 5 % for the variance. The
     # sum of correlations is cut where they drown in chance, and starts half a step late: a quarter may be missing.
     np.testing.assert_allclose(learned.var, 0.25, rtol=0.2)
@@ -135,7 +137,7 @@ def test_what_was_not_seen_changes_little(pattern: str, rng: np.random.Generator
             r[rng.random(len(r)) < 0.5, 1] = np.nan
         else:
             r[1000:4000, 1] = np.nan
-    learned = inphase.learn_noise(times, residuals)
+    learned = regression_noise(times, residuals)
     np.testing.assert_allclose(learned.var, 0.25, rtol=0.2)
     np.testing.assert_allclose(learned.correlation_time, 0.2, rtol=0.3)
 
@@ -143,17 +145,17 @@ def test_what_was_not_seen_changes_little(pattern: str, rng: np.random.Generator
 def test_a_demonstration_without_the_channel_has_no_say(rng: np.random.Generator) -> None:
     times = [np.arange(1000) * 0.02] * 4
     residuals = [wobble(t, 2, 0.5, 0.2, rng) for t in times]
-    expected = inphase.learn_noise(times[:2], residuals[:2])
+    expected = regression_noise(times[:2], residuals[:2])
     for r in residuals[2:]:
         r[:, 0] = np.nan
-    learned = inphase.learn_noise(times, residuals)
+    learned = regression_noise(times, residuals)
     np.testing.assert_allclose(learned.var[0], expected.var[0], rtol=1e-12)
     np.testing.assert_allclose(learned.correlation_time[0], expected.correlation_time[0], rtol=1e-12)
 
 
 def test_no_residual_is_taken_for_no_noise() -> None:
     times = [np.arange(10) * 0.1] * 2
-    learned = inphase.learn_noise(times, [np.zeros((10, 1))] * 2)
+    learned = regression_noise(times, [np.zeros((10, 1))] * 2)
     assert 0 < learned.var[0] < 1e-6
     assert learned.correlation_time[0] == 0
 
@@ -162,5 +164,36 @@ def test_residuals_are_not_changed(rng: np.random.Generator) -> None:
     times, residuals = [np.arange(20) * 0.1], [rng.normal(size=(20, 2))]
     residuals[0][3] = np.nan
     before = residuals[0].copy()
-    inphase.learn_noise(times, residuals)
+    regression_noise(times, residuals)
     np.testing.assert_array_equal(residuals[0], before)
+
+
+def test_what_is_held_out_is_explained_by_the_others_as_a_filter_would(rng: np.random.Generator) -> None:
+    layout, shown, grid = Layout((Gaussian(4), Polynomial(2), Gaussian(4))), np.array([1.0, 1.0, 0.0]), 200
+    weights = rng.normal(size=(6, layout.size)) + 5.0
+    phases = (np.arange(grid) + 0.5) / grid
+    functions = np.stack([layout.predict(phases, unit).ravel() for unit in np.eye(layout.size)], axis=1)  # (P F, B)
+    var = np.stack([layout.predict(phases, w) for w in weights]).var(0).mean(0)
+    for _ in range(3):
+        left = []
+        for i, own in enumerate(weights):
+            others = np.delete(weights, i, axis=0)
+            mean, cov = others.mean(0), np.cov(others, rowvar=False)
+            seen = np.tile(shown > 0, grid)  # Bayesian linear regression, in the space of the weights
+            design, noise = functions[seen], np.tile(var, grid)[seen] * grid
+            gain = cov @ design.T @ np.linalg.inv(design @ cov @ design.T + np.diag(noise))
+            left.append((functions @ (own - mean - gain @ design @ (own - mean))).reshape(grid, 3))
+        var = np.mean(np.square(left), axis=(0, 1))
+    held_out = held_out_noise(layout, weights, shown, duration=2.0)
+    np.testing.assert_allclose(held_out.var, var, rtol=1e-8)
+    longer = held_out_noise(layout, weights, shown, duration=6.0)
+    np.testing.assert_array_equal(longer.var, held_out.var)
+    np.testing.assert_allclose(longer.correlation_time, 3 * held_out.correlation_time)
+
+
+def test_noises_of_two_sources_add_up() -> None:
+    one, other = Noise(np.array([1.0, 2.0]), np.array([0.1, 0.0])), Noise(np.array([3.0, 2.0]), np.array([0.5, 0.2]))
+    total = both(one, other)
+    np.testing.assert_array_equal(total.var, [4.0, 4.0])
+    # The integral of the autocovariance of a sum of independent processes is the sum of theirs.
+    np.testing.assert_allclose(total.var * total.correlation_time, [1 * 0.1 + 3 * 0.5, 2 * 0.2])

@@ -202,12 +202,12 @@ def test_gaps_are_where_no_reading_is_near(periodic: bool) -> None:
     middle = unseen(phases[(phases < 0.3) | (phases > 0.6)], periodic)
     assert 0.3 < middle.min() < 0.33
     assert 0.57 < middle.max() < 0.6
-    start = unseen(phases[phases > 0.1], periodic)
-    assert start.max() < 0.1
-    # On the circle, the readings before 1 speak for what follows 0.
-    assert (start.min() > 0.015) == periodic
-    turned = unseen(phases[phases > 0.1] + 3.0, periodic=True)
-    np.testing.assert_allclose(turned, unseen(phases[phases > 0.1], periodic=True))
+    # On the circle, the readings just before 1 speak for what follows 0, and the other way round.
+    late, early = phases[(phases > 0.1) & (phases < 1)], phases[(phases > 0) & (phases < 0.9)]
+    assert (unseen(late, periodic).min() > 0.01) == periodic
+    assert (unseen(early, periodic).max() < 0.99) == periodic
+    assert unseen(late, periodic).max() < 0.1
+    np.testing.assert_array_equal(unseen(late + 3.0, periodic=True), unseen(late, periodic=True))
 
 
 def test_wide_gaussians_stay_sane(rng: np.random.Generator) -> None:

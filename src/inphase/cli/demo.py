@@ -17,7 +17,7 @@ from inphase.cli.scores import LEGEND, ScoreTable, figures
 from inphase.errors import OptionError, listing
 from inphase.filters import FILTERS
 from inphase.io import load
-from inphase.io.handwriting import export_handwriting
+from inphase.io.handwriting import check_shapes, export_handwriting
 from inphase.report.replay_picture import check_picture, draw_replays
 from inphase.training import fit
 
@@ -77,6 +77,7 @@ def _check(output: Path, picture: Path, shapes: tuple[str, ...], filter: str) ->
         raise OptionError(f"cannot write into {output}: expected a folder, got a file")
     if not shapes:
         raise OptionError(f"expected at least one shape, such as {listing(SHAPES)}, got none")
+    check_shapes(shapes)
     if filter not in FILTERS:
         raise OptionError(f"unknown filter {filter!r}; one of {listing(FILTERS)}")
     check_picture(picture)
@@ -85,6 +86,6 @@ def _check(output: Path, picture: Path, shapes: tuple[str, ...], filter: str) ->
 def _program() -> str:
     """How this program was called, so that a line can be pasted: it need not be on the path, as under `make demo`."""
     called = sys.argv[0]
-    if Path(called).stem != "inphase" or shutil.which("inphase") == called:
-        return "inphase"
-    return shlex.quote(called)
+    if Path(called).name == "__main__.py":
+        return f"{shlex.quote(sys.executable)} -m inphase.cli"
+    return shlex.quote(called) if Path(called).stem == "inphase" and shutil.which("inphase") != called else "inphase"

@@ -15,6 +15,7 @@ from inphase.cli.console import Output, waiting
 from inphase.cli.reading import AsJson, Columns, Recordings
 from inphase.errors import OptionError, listing
 from inphase.io import find_episodes, read_episode
+from inphase.io.atomic import check_target
 from inphase.training import fit as fit_model
 from inphase.training import learn_phase
 
@@ -39,6 +40,7 @@ def fit(
         periodic: an episode is one cycle of an interaction that goes on and on
         json_: print the model's card as JSON
     """
+    check_target(output)
     chosen = parse_basis(basis) if basis is not None else None
     if not (columns.observed and columns.controlled):
         first = read_episode(find_episodes(data)[0], time=columns.time, delimiter=columns.separator)

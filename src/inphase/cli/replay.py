@@ -16,6 +16,7 @@ from inphase.cli.picture import panel
 from inphase.cli.reading import AsJson, Columns, Format, Recordings
 from inphase.cli.scores import LEGEND, ScoreTable, figures
 from inphase.evaluation.replay import fitting
+from inphase.io.atomic import check_target
 from inphase.model import Model
 from inphase.report.replay_picture import check_picture, draw_replays
 
@@ -46,6 +47,7 @@ def replay(
     """
     if picture is not None:
         check_picture(picture)
+        check_target(picture)
     trained = Model.load(model)
     session = trained.session(filter, seed, **({} if members is None else {"members": members}))
     demonstrations = fitting(trained, Columns(format.time, format.delimiter).load(recordings))
