@@ -302,7 +302,7 @@ def test_references_are_the_mean_angle_and_orientation(rng):
     apart = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0]])
     assert average(apart) is None
     for sign in (1, -1):
-        found = Coordinates.learn(channels_of(["quaternion"]), [sign * apart[:1], apart[1:]]).references
+        found = Coordinates.learn(channels_of(["quaternion"]), [sign * apart[:1] + 0.0, apart[1:]]).references
         assert_array_equal(found, apart[0])
 
 

@@ -176,7 +176,7 @@ def test_the_root_squared_is_the_covariance(size: int, seed: int, singular: floa
 
 def test_members_start_as_the_demonstrations_and_the_prior_over_phase(rng: np.random.Generator) -> None:
     phase = phase_model(2)
-    model = chance_model(rng, PhaseModel(phase.mean + [0.4, 0, 0], phase.cov, 0.0, 1.0))
+    model = chance_model(rng, PhaseModel(phase.mean + np.array([0.4, 0, 0]), phase.cov, 0.0, 1.0))
     members = make("ebip", model, members=20_000).init(rng).members
     variances = np.diag(phase.cov)
     tolerance = 4.5 * np.sqrt((np.outer(variances, variances) + phase.cov**2) / 20_000)  # of a sample covariance
@@ -241,7 +241,7 @@ def test_with_the_phase_known_ebip_comes_as_close_as_its_members_are_many(rng: n
         )
 
     few, many = errors(100), errors(6400)
-    # The errors shrink by sqrt(64) = 8, that is by nothing in these units: within the chance of 12 seeds of few weights.
+    # Errors shrink by sqrt(64) = 8, which is by nothing in these units, give or take the chance of 12 seeds.
     assert (many < 2 * few).all()
     assert (few < 2.5 * many).all()
     assert many[0] < 4  # 4 standard errors of a mean of E draws

@@ -1,4 +1,4 @@
-"""Invariance: what a filter must not care about - unseen channels, order, units, clocks, rates, whole turns and signs."""
+"""Invariance: what filters must not care about: unseen channels, order, units, clocks, rates, whole turns, signs."""
 
 from __future__ import annotations
 

@@ -77,6 +77,15 @@ def test_trimmed_twice_is_trimmed_once(seed):
         assert len(a) - len(b) <= 0.1 * 60
 
 
+def test_a_slow_sensor_is_enough(rng):
+    """Also where the neighbours of a sample lie further off than a slope looks, and a channel was seen but once."""
+    times, values = episode(rng, 4.0, 7.0, 12.0, rate=4.0, noise=0.0, missing=0.0)
+    values[1:, 3] = np.nan
+    trimmed = trim(dataset([(times, values)]))[0]
+    assert trimmed.times[0] == pytest.approx(4.0, abs=0.5)
+    assert trimmed.times[-1] == pytest.approx(7.0, abs=0.5)
+
+
 def test_the_margin_is_kept_on_both_sides(rng):
     recorded = dataset([episode(rng, 2.0, 3.5, 6.0, jitter=0.0)])
     tight, wide = (trim(recorded, margin=margin)[0] for margin in (0.0, 0.5))

@@ -13,7 +13,7 @@ from inphase.preprocess.coordinates import Coordinates
 from inphase.trajectory import SHORTEST, Dataset, Demonstration
 
 SIDE = 0.1  # [s] speed is told from the mean of this much before and that of as much after
-FIDGET = 0.05  # of the way of the longest movement: one that goes less far is none
+FIDGET = 0.05  # of the way of the longest movement: what goes less far is no movement
 LEAST = 0.2  # of an episode: one of which less would be left is left whole
 
 
@@ -59,7 +59,7 @@ def _speed(times: Float[np.ndarray, " T"], features: Float[np.ndarray, "T F"]) -
     slopes = np.full(features.shape, np.nan)
     for f, feature in enumerate(features.T):
         seen = ~np.isnan(feature)
-        if seen.sum() > 1:
+        if seen.any():
             bridged = np.interp(times, times[seen], feature[seen], left=np.nan, right=np.nan)
             slopes[:, f] = _slope(times, bridged, first, last)
     known = ~np.isnan(slopes)

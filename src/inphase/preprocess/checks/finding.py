@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass
 
 
@@ -38,7 +39,8 @@ class Finding:
     """One fault of a recording; many of one kind in one channel are one finding, with the first time and a count.
 
     episode: its name, or EVERY_EPISODE. channel: a channel, the group of a quaternion or of channels of one unit, or
-    None where all are concerned. time: [s], in the clock of the episode, None where the whole of it is concerned.
+    None where all are concerned. time: [s], in the clock of the episode, None where the whole of it is
+    concerned or the clock did not know.
     """
 
     episode: str
@@ -46,6 +48,10 @@ class Finding:
     time: float | None
     kind: FindingKind
     message: str
+
+    def __post_init__(self) -> None:
+        if self.time is not None and not math.isfinite(self.time):
+            object.__setattr__(self, "time", None)
 
     @property
     def severity(self) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from inphase.channels import Channel, Kind
-from inphase.preprocess.checks.clock import GAP, median_step
+from inphase.preprocess.checks.clock import median_step
 from inphase.preprocess.checks.finding import Finding, FindingKind, clock, times_over
 from inphase.preprocess.checks.stillness import is_switch, spread_of
 from inphase.preprocess.checks.tracks import Track, group_spreads, tracks
@@ -59,21 +59,15 @@ def check_jumps(
 
 def _sudden(times: Float[np.ndarray, " N"], path: Float[np.ndarray, "N C"], spread: float) -> Bool[np.ndarray, " N-1"]:
     """(N-1,) whether each step of the path is one that no smooth movement takes."""
-    stretch, gap = _stretch(times)
-    speeds = np.diff(path, axis=0) / stretch[:, None]
+    lasts = np.diff(times) / median_step(times)
+    # Over a longer step more may happen; but a stamp that comes too soon makes no movement faster.
+    speeds = np.diff(path, axis=0) / np.where(lasts > 1, lasts, 1.0)[:, None]
     sizes = np.linalg.norm(speeds, axis=1)
     # How much of the step is news to one who has seen the step before it, and to one who knows the step after it.
     change = np.linalg.norm(np.diff(speeds, axis=0), axis=1)
     news = np.minimum(np.concatenate([[np.inf], change]), np.concatenate([change, [np.inf]]))
     usual = OUTLIER * 1.4826 * float(np.median(sizes))
-    return np.asarray((sizes > max(SHARE * spread, usual)) & (news > SUDDEN * sizes) & ~gap)
-
-
-def _stretch(times: Float[np.ndarray, " N"]) -> tuple[Float[np.ndarray, " N-1"], Bool[np.ndarray, " N-1"]]:
-    """(N-1,) how many median steps each step lasts, at least 1, and whether it is a gap."""
-    lasts = np.diff(times) / median_step(times)
-    lasts = np.where(np.isfinite(lasts), np.maximum(lasts, 1.0), 1.0)
-    return lasts, np.asarray(lasts > GAP)
+    return np.asarray((sizes > max(SHARE * spread, usual)) & (news > SUDDEN * sizes))
 
 
 def _turned(
