@@ -55,7 +55,7 @@ def outcome(read: Callable[[Path], Table], path: Path) -> Table | str:
 
 # ------------------------------------------------------------------------------------------------------------- CSV
 
-NUMBERS = st.floats(allow_infinity=False) | st.integers(-1000, 1000).map(float)
+NUMBERS = st.floats(allow_infinity=False) | st.integers(-1000, 1000).map(float) | st.just(np.nan)
 TABLES = hnp.arrays(np.float64, st.tuples(st.integers(1, 6), st.integers(2, 5)), elements=NUMBERS)
 SPELLINGS = st.sampled_from(["", "nan", "NaN", "NA", "null", " "])
 
@@ -165,6 +165,7 @@ def test_csv_of_another_delimiter(write: Write) -> None:
     with pytest.raises(DataError, match=r"line 3, channel 'x': expected a number, got '1,5' \(a decimal comma\?"):
         read_csv(path, delimiter=";")
     np.testing.assert_array_equal(read_csv(write("b.csv", "time\tx\n0\t1\n"), delimiter=r"\t").values, [[1]])
+    np.testing.assert_array_equal(read_csv(write("c.csv", "time   x\n0.25   1\n"), delimiter=" ").values, [[1]])
     for wrong in ("", ";;", '"', "\n"):
         with pytest.raises(OptionError, match="expected a delimiter of one character"):
             read_csv(path, delimiter=wrong)
@@ -284,6 +285,12 @@ def test_npz_that_swells_is_not_unpacked(write: Write, monkeypatch: pytest.Monke
         read_npz(path)
 
 
+def test_npz_of_python_2(write: Write) -> None:
+    header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (3L,), }".ljust(117) + b"\n"
+    member = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + TIMES.tobytes()
+    np.testing.assert_array_equal(read_npz(write("episode.npz", zipped(time=member, x=member))).times, TIMES)
+
+
 def test_npz_runs_nothing(write: Write) -> None:
     class Trap:
         def __reduce__(self) -> tuple[Callable[[str], int], tuple[str]]:
@@ -316,7 +323,7 @@ def test_damaged_npz_is_a_table_or_a_data_error(tmp_path_factory, at: int, byte:
 def test_folders_are_in_natural_order(write: Write) -> None:
     for number in (10, 9, 1, 2, 100):
         write(f"data/episode_{number}.csv")
-    write("data/Episode_3.npz")
+    write("data/Episode_3.NPZ")
     write("data/notes.txt")
     write("data/._episode_1.csv")  # what macOS leaves on sticks
     write("data/deeper/episode_4.csv")
@@ -340,7 +347,7 @@ def test_patterns(write: Write, tmp_path: Path) -> None:
 def test_sequences_keep_their_order_and_count_a_file_once(write: Write) -> None:
     for name in ("b/1.csv", "b/2.csv", "a/1.csv"):
         write(name)
-    assert [p.as_posix() for p in find_episodes(["b/2.csv", Path("b"), "a/*", "./b/1.csv"])] == [
+    assert [p.as_posix() for p in find_episodes(["b/2.csv", Path("b"), "a/*", Path.cwd() / "b/1.csv"])] == [
         "b/2.csv", "b/1.csv", "a/1.csv",
     ]  # fmt: skip
 

@@ -203,10 +203,11 @@ def test_gaps_are_where_no_reading_is_near(periodic: bool) -> None:
     assert 0.3 < middle.min() < 0.33
     assert 0.57 < middle.max() < 0.6
     # On the circle, the readings just before 1 speak for what follows 0, and the other way round.
-    late, early = phases[(phases > 0.1) & (phases < 1)], phases[(phases > 0) & (phases < 0.9)]
+    late, early = phases[20:-2] + 0.001, phases[2:-20] + 0.001  # no distance is just the one that decides
     assert (unseen(late, periodic).min() > 0.01) == periodic
     assert (unseen(early, periodic).max() < 0.99) == periodic
     assert unseen(late, periodic).max() < 0.1
+    assert unseen(phases[20:], periodic=False).min() < 0.01  # phase 1 is not phase 0
     np.testing.assert_array_equal(unseen(late + 3.0, periodic=True), unseen(late, periodic=True))
 
 

@@ -81,7 +81,6 @@ def test_what_never_moves_is_named_and_not_stretched():
         np.array([[1.0, nan, 7.0, nan, 0.3, 2.5]]),
     ]
     scaling = Scaling.learn(groups, values)
-    assert_array_equal(scaling.still, [0, 2, 3, 4])
     assert_array_equal(scaling.span, [5.0, 5.0, 1.0, 1.0, 1.0, 0.5])
     assert_array_equal(scaling.offset, [1.0, 1.0, 7.0, 0.0, 0.3, 2.0])
     assert_allclose(scaling.scale(np.array([1.0, 6.0, 7.5, 3.0, 1.3, 2.5])), [0, 1, 0.5, 3, 1, 1])
@@ -90,7 +89,6 @@ def test_what_never_moves_is_named_and_not_stretched():
 def test_nothing_to_learn_from_is_no_scaling():
     scaling = Scaling.learn(["a", "b"], [])
     assert_array_equal(scaling.scale(np.array([2.0, -3.0])), [2.0, -3.0])
-    assert_array_equal(scaling.still, [0, 1])
 
 
 def test_none_changes_nothing(rng):
@@ -98,7 +96,6 @@ def test_none_changes_nothing(rng):
     scaling = Scaling.none(5)
     for change in (scaling.scale, scaling.unscale, scaling.scale_var, scaling.unscale_var):
         assert_array_equal(change(values), values)
-    assert len(scaling.still) == 0
 
 
 def test_a_scaling_is_frozen_and_refuses_what_makes_no_sense():

@@ -7,9 +7,19 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from interactions import CONTROLLED, OBSERVED, chance_model, curves, dataset, phase_model, recording, waves
+from interactions import (
+    CONTROLLED,
+    OBSERVED,
+    chance_model,
+    curves,
+    dataset,
+    phase_model,
+    recording,
+    shapes_unchecked,
+    waves,
+)
 
 import inphase
 from inphase.basis.fit import fit_weights
@@ -25,7 +35,7 @@ Sample = np.ndarray | Mapping[str, float] | Sequence[float]
 
 @pytest.fixture(scope="module")
 def demos() -> inphase.Dataset:
-    return dataset(np.random.default_rng(7), rate=RATE)
+    return dataset(np.random.default_rng(7), count=16, rate=RATE)
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +91,8 @@ def test_a_sample_may_come_in_many_forms(name: str, model: inphase.Model, live: 
         lambda v: {"reach": float(v[0]), "lift": float(v[1])},
         lambda v: {"lift": v[1], "reach": v[0], "grip": np.nan, "turn": np.inf},
     ]
-    answers = {bytes_of(*watch(model.session(name), times, [form(v) for v in samples])) for form in forms}
+    with shapes_unchecked():  # to numpy's protocols, as beartype reads them, a tuple is no sequence
+        answers = {bytes_of(*watch(model.session(name), times, [form(v) for v in samples])) for form in forms}
     assert len(answers) == 1
 
 
@@ -116,6 +127,7 @@ def test_nothing_that_goes_in_is_changed(name: str, model: inphase.Model) -> Non
         (1.0, [[0.1, 0.2]], r"expected 2 values, one for each of reach, lift, got shape \(1, 2\)"),
         (1.0, 0.1, r"expected 2 values, one for each of reach, lift, got shape \(\)"),
         (1.0, ["high", "low"], "reach, lift.*high"),
+        (1.0, {"reach": 0.1, "lift": "low"}, "lift.*low"),
         (1.0, {"raech": 0.1}, "unknown channel 'raech'; the channels are reach, lift, grip, turn"),
         (1.0, {"reach": 0.1, "3": 0.1}, "unknown channel '3'"),
         (0.49, [0.1, 0.2], r"expected a time of at least 0.5 s, got 0.49 s"),
@@ -128,7 +140,7 @@ def test_a_mistake_is_named_and_leaves_no_trace(
 ) -> None:
     one, other = model.session("ebip"), model.session("ebip")
     before = [session.observe(0.5, [0.05, 0.1]) for session in (one, other)]
-    with pytest.raises(ObservationError, match=message):
+    with shapes_unchecked(), pytest.raises(ObservationError, match=message):
         one.observe(time, sample)
     after = [session.observe(0.6, [0.1, 0.2]) for session in (one, other)]
     assert before[0] == before[1]
@@ -252,13 +264,13 @@ def test_before_anything_is_seen_the_response_is_the_mean_of_the_demonstrations(
     np.testing.assert_allclose(response.mean, model.predict(response.phases), rtol=1e-12)
     # Where a phase is named, there is no doubt about it: what is left is the spread of the demonstrations.
     at_half = model.session("bip").respond(start=0.5, samples=1, channels="*")
-    mean, std = model.distribution(0.5)
+    mean, std = model.distribution([0.5])
     np.testing.assert_allclose(at_half.mean, mean, rtol=1e-12)
     np.testing.assert_allclose(at_half.std, std, rtol=1e-12)
     drawn = model.session("ebip", members=400).respond(start=0.5, samples=1, channels="*")
-    # The demonstrations in equal parts: the mean is theirs, the spread as well but for 400 / 399 · 7 / 8.
+    # The demonstrations in equal parts: the mean is theirs, the spread as well but for 400 / 399 · 15 / 16.
     np.testing.assert_allclose(drawn.mean, mean, rtol=1e-9)
-    spread = (std**2 - model.noise.var * model.scaling.span**2) * 400 / 399 * 7 / 8
+    spread = (std**2 - model.noise.var * model.scaling.span**2) * 400 / 399 * 15 / 16
     np.testing.assert_allclose(drawn.std**2, spread + model.noise.var * model.scaling.span**2, rtol=1e-9)
 
 
@@ -276,7 +288,7 @@ def test_a_response_knows_the_partner(name: str, model: inphase.Model) -> None:
         ours.append(np.abs(response.mean - truth).mean())
         means.append(np.abs(model.predict(response.phases)[:, 2:] - truth).mean())
         assert (np.abs(response.mean - truth) < 4 * response.std).all()
-    assert np.mean(ours) < 0.6 * np.mean(means)
+    assert np.mean(ours) < 0.4 * np.mean(means)
 
 
 @NAMES
@@ -289,7 +301,7 @@ def test_what_the_robot_does_may_be_seen_too(name: str, model: inphase.Model) ->
     watch(with_grip, times, [{"lift": row[1], "grip": row[2]} for row in values])
     poor, good = without.respond(samples=20, channels="grip"), with_grip.respond(samples=20, channels="grip")
     error = [np.abs(r.mean[:, 0] - curves(r.phases, style)[:, 2]).mean() for r in (poor, good)]
-    assert error[1] < 0.7 * error[0]
+    assert error[1] < 0.5 * error[0]
     assert (good.std < poor.std).mean() > 0.9
 
 
@@ -443,15 +455,15 @@ def test_a_partner_like_the_others_is_followed_to_the_end(name: str, model: inph
 
 
 @NAMES
-def test_the_end_is_told(name: str, model: inphase.Model, live: tuple) -> None:
+def test_the_end_is_told_and_stays(name: str, model: inphase.Model, live: tuple) -> None:
     times, samples = partner(live)
     session = model.session(name)
-    watch(session, times, samples)
+    before = watch(session, times, samples)
     rng = np.random.default_rng(0)
     waits = [session.observe(2.0 + i / RATE, samples[-1] + 0.01 * rng.standard_normal(2)) for i in range(1, 26)]
-    assert waits[-1].status is Status.FINISHED
-    assert waits[-1].phase >= 0.999
-    assert waits[-1].status.trustworthy
+    assert Status.FINISHED not in {e.status for e in before[: len(before) * 4 // 5]}
+    assert {e.status for e in waits[12:]} == {Status.FINISHED}
+    assert Status.FINISHED.trustworthy
 
 
 @NAMES
@@ -538,6 +550,8 @@ SAMPLES = st.lists(
 @pytest.mark.parametrize("periodic", [False, True])
 @settings(max_examples=25)
 @given(SAMPLES)
+@example([(0.0, {"reach": 1e308, "lift": -1.7e308, "turn": 1.7e308}), (0.1, {"reach": 0.1})])
+@example([(0.0, {"reach": 1e160}), (0.0, {"reach": 1e152}), (1e-308, {"reach": 0.0}), (300.0, {"lift": 0.0})])
 def test_no_sample_at_all_breaks_a_control_loop(
     name: str, periodic: bool, samples: list[tuple[float, dict[str, float]]]
 ) -> None:

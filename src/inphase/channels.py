@@ -93,6 +93,15 @@ def make_channels(
     return channels
 
 
+def check_channels(channels: Sequence[Channel]) -> None:
+    """Raise ChannelError for a name that stands twice, controlled channels before observed ones, a broken quaternion."""
+    check_unique([channel.name for channel in channels])
+    roles = [channel.role for channel in channels]
+    if roles != sorted(roles, key=lambda role: role is Role.CONTROLLED):
+        raise ChannelError("expected the observed channels before the controlled ones")
+    quaternions(channels)
+
+
 def check_unique(names: Sequence[str]) -> None:
     """Raise ChannelError where a name stands twice."""
     twice = [name for i, name in enumerate(names) if name in names[:i]]

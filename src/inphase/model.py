@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from inphase.arrays import freeze
 from inphase.basis.layout import Layout
-from inphase.channels import Channel, Role
+from inphase.channels import Channel, Role, check_channels
 from inphase.errors import OptionError
 from inphase.noise import Noise
 from inphase.phase import PhaseModel
@@ -60,6 +60,11 @@ class Model:
         ):
             if expected != got:
                 raise OptionError(f"{what}: expected {expected}, got {got}")
+        check_channels(self.channels)
+        if not self.observed or not self.controlled:
+            raise OptionError(f"expected observed and controlled channels, got {self.observed} and {self.controlled}")
+        if not (np.isfinite(self.spread) & (self.spread > 0)).all():
+            raise OptionError(f"expected a positive, finite spread of every channel, got {self.spread}")
         if self.phase.periodic != self.layout.periodic:
             raise OptionError(
                 f"expected phase and basis to be both periodic or both not, got phase.periodic={self.phase.periodic} "

@@ -10,8 +10,8 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from inphase.arrays import freeze
-from inphase.channels import Channel, Kind, Role, group_of, make_channels, quaternions
-from inphase.errors import ChannelError, DataError, listing
+from inphase.channels import Channel, Kind, Role, check_channels, group_of, make_channels
+from inphase.errors import DataError, listing
 
 SHORTEST = 3  # samples: two span a line and say nothing about a movement
 QUATERNION_NORM = (0.9, 1.1)  # what four channels named like a quaternion must measure to be taken for one …
@@ -86,10 +86,7 @@ class Dataset:
         object.__setattr__(self, "provenance", dict(self.provenance))
         if not self.demonstrations:
             raise DataError("expected at least one demonstration, got none")
-        roles = [channel.role for channel in self.channels]
-        if roles != sorted(roles, key=lambda role: role is Role.CONTROLLED):
-            raise ChannelError("expected the observed channels before the controlled ones")
-        quaternions(self.channels)
+        check_channels(self.channels)
         for demonstration in self.demonstrations:
             if demonstration.values.shape[1] != len(self.channels):
                 raise DataError(

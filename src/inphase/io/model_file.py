@@ -152,20 +152,45 @@ def _split(shapes: dict[str, list[int]], payload: bytes) -> dict[str, Any]:
 
 def _build(described: dict[str, Any], arrays: dict[str, Any]) -> Model:
     channels = tuple(
-        Channel(c["name"], Role(c["role"]), c["unit"], Kind(c["kind"]), c["group"]) for c in described["channels"]
+        Channel(_text(c["name"]), Role(c["role"]), _text(c["unit"]), Kind(c["kind"]), _text(c["group"]))
+        for c in described["channels"]
     )
     bases = [basis.make(**entry) for entry in described["bases"]]
     phase = described["phase"]
+    if not isinstance(phase["periodic"], bool):
+        raise ValueError(f"expected periodic to be true or false, got {phase['periodic']!r}")
     return Model(
         channels=channels,
         coordinates=Coordinates(channels, arrays["references"]),
         scaling=Scaling(arrays["low"], arrays["high"]),
-        layout=Layout(tuple(bases[i] for i in described["basis_of_feature"])),
-        prior=WeightPrior(arrays["weights"], described["prior"]["shrinkage"]),
+        layout=Layout(tuple(bases[_index(i, len(bases))] for i in described["basis_of_feature"])),
+        prior=WeightPrior(arrays["weights"], _number(described["prior"]["shrinkage"])),
         noise=Noise(arrays["noise_var"], arrays["noise_correlation_time"]),
         phase=PhaseModel(
-            arrays["phase_mean"], arrays["phase_cov"], phase["diffusion"], phase["nominal_velocity"], phase["periodic"]
+            arrays["phase_mean"],
+            arrays["phase_cov"],
+            _number(phase["diffusion"]),
+            _number(phase["nominal_velocity"]),
+            phase["periodic"],
         ),
         spread=arrays["spread"],
-        provenance={str(k): str(v) for k, v in described["provenance"].items()},
+        provenance={_text(k): _text(v) for k, v in described["provenance"].items()},
     )
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise ValueError(f"expected text, got {value!r}")
+    return value
+
+
+def _number(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ValueError(f"expected a number, got {value!r}")
+    return float(value)
+
+
+def _index(value: object, count: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < count:
+        raise ValueError(f"expected a whole number from 0 to {count - 1}, got {value!r}")
+    return value

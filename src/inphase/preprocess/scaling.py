@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from inphase.arrays import freeze, frozen
 from inphase.errors import OptionError, listing
@@ -20,18 +20,14 @@ class Scaling:
     """Brings every feature to 0 … 1 over the demonstrations; features of one group share `low` and `high`.
 
     low, high: (F,) what becomes 0 and 1; where both are the same, 1 is one unit above `low`.
-    still: (K,) the features that never moved when it was learned. Raises OptionError where high is below low.
+    Raises OptionError where high is below low.
     """
 
     low: Float[np.ndarray, " F"]
     high: Float[np.ndarray, " _F"]
-    still: Int[np.ndarray, " K"] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
         freeze(self, low=self.low, high=self.high)
-        still = np.array(self.still, dtype=np.int64)
-        still.setflags(write=False)
-        object.__setattr__(self, "still", still)
         if self.low.ndim != 1 or self.low.shape != self.high.shape:
             raise OptionError(f"expected low (F,) and high (F,), got {self.low.shape} and {self.high.shape}")
         wrong = np.flatnonzero(~(np.isfinite(self.low) & np.isfinite(self.high) & (self.high >= self.low)))
@@ -51,7 +47,7 @@ class Scaling:
         bottom = np.array([lowest[together].min() for together in members])
         top = np.array([highest[together].max() for together in members])
         low = np.where(np.isfinite(bottom), bottom, 0.0)
-        return cls(low, np.where(_still(bottom, top), low, top), np.flatnonzero(_still(lowest, highest)))
+        return cls(low, np.where(_still(bottom, top), low, top))
 
     @classmethod
     def none(cls, count: int) -> Scaling:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from jaxtyping import Float
 
 from inphase.basis import Basis, Gaussian, Layout, Periodic
 from inphase.basis.fit import fit_weights, residuals
-from inphase.channels import Role, spread
+from inphase.channels import Role, quaternions, spread
 from inphase.errors import DataError, OptionError, listing
 from inphase.model import Model
 from inphase.noise import Noise
@@ -68,7 +69,7 @@ def fit(
         prior=prior if prior is not None else WeightPrior(weights),
         noise=noise,
         phase=phase,
-        spread=np.nanstd(np.concatenate(values), axis=0),
+        spread=_spread(dataset),
         provenance={**dataset.provenance, "demonstrations": str(len(dataset))},
     )
 
@@ -81,16 +82,27 @@ def _check(dataset: Dataset) -> None:
             raise DataError(
                 f"expected at least one {role} channel, got none; the channels are {listing(dataset.names)}"
             )
-    everything = np.concatenate([demonstration.values for demonstration in dataset])
-    for name, column in zip(dataset.names, everything.T, strict=True):
-        seen = column[np.isfinite(column)]
+    parts = quaternions(dataset.channels)
+    for i, name in enumerate(dataset.names):
+        # A wrist that turns about one axis leaves others at 0: what has to move is the quaternion, not each number.
+        together = next((list(part) for part in parts if i in part), [i])
+        seen = np.concatenate([demonstration.values[:, together] for demonstration in dataset])
+        seen = seen[np.isfinite(seen).all(1)]
         if len(seen) == 0:
             raise DataError(f"channel {name!r}: expected readings, got none in any of {len(dataset)} demonstrations")
-        if np.ptp(seen) <= 1e-12 * np.abs(seen).max():
+        if (np.ptp(seen, axis=0) <= 1e-12 * np.abs(seen).max()).all():
             raise DataError(
-                f"channel {name!r}: expected a channel that moves, got {seen[0]:g} in every sample of all "
-                f"{len(dataset)} demonstrations; leave it out"
+                f"channel {name!r}: expected a channel that moves, got {seen[0, together.index(i)]:g} in every sample "
+                f"of all {len(dataset)} demonstrations; leave it out"
             )
+
+
+def _spread(dataset: Dataset) -> Float[np.ndarray, " D"]:
+    """The standard deviation of every channel over the demonstrations; the four of a quaternion share theirs."""
+    over_all = np.nanstd(np.concatenate([demonstration.values for demonstration in dataset]), axis=0)
+    for part in quaternions(dataset.channels):
+        over_all[list(part)] = np.sqrt(np.mean(over_all[list(part)] ** 2))
+    return np.asarray(over_all)
 
 
 def _bases(
