@@ -86,7 +86,7 @@ def test_definitions(size: int, width: float, phase: float) -> None:
     kappa = 1 / (2 * math.pi * width) ** 2
     periodic = [math.exp(kappa * (math.cos(2 * math.pi * (phase - k / size)) - 1)) for k in range(size)]
     polynomial = [math.comb(size - 1, k) * phase**k * (1 - phase) ** (size - 1 - k) for k in range(size)]
-    np.testing.assert_allclose(Gaussian(size, width)(at), gaussian, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(Gaussian(size, width, margin=0.0)(at), gaussian, rtol=1e-9, atol=1e-15)
     np.testing.assert_allclose(Sigmoid(size, width)(at), sigmoid, rtol=1e-9, atol=1e-15)
     np.testing.assert_allclose(Periodic(size, width)(at), periodic, rtol=1e-9, atol=1e-15)
     np.testing.assert_allclose(Polynomial(size - 1)(at), polynomial, rtol=1e-9, atol=1e-15)
@@ -117,11 +117,21 @@ def test_phases_are_left_alone_and_nan_stays_nan(basis: Basis) -> None:
 @pytest.mark.parametrize("size", [5, 12, 40])
 def test_default_gaussians_add_up_to_a_flat_line_and_stay_apart(size: int) -> None:
     basis = Gaussian(size)
-    assert basis.width == 1 / (size - 1)
+    assert basis.width == pytest.approx(1 / (size - 3))  # the outer centres lie one distance beyond the ends
     values = basis(np.linspace(0, 1, 2000))
-    assert np.linalg.cond(values.T @ values) < 1e4
+    assert np.linalg.cond(values.T @ values) < 1e5
     wide = Gaussian(41)(np.linspace(0.3, 0.7, 500)).sum(-1)  # far from the ends, where there are fewer neighbours
     assert np.ptp(wide) / wide.mean() < 2e-8
+
+
+def test_gaussians_hold_still_at_the_ends() -> None:
+    phases = np.linspace(0, 1, 500)
+    still = np.ones(500)
+    errors = [
+        np.abs(basis(phases) @ np.linalg.lstsq(basis(phases), still, rcond=None)[0] - still).max()
+        for basis in (Gaussian(12), Gaussian(12, margin=0.0))
+    ]
+    assert errors[0] < 0.005 < 0.02 < errors[1]
 
 
 def test_default_sigmoid_slopes_are_bumps_as_wide_as_the_distance_between_centres() -> None:
@@ -146,7 +156,7 @@ def test_bernstein_spans_the_monomials_and_adds_up_to_one(degree: int) -> None:
 def test_intprim_names_the_variance() -> None:
     phases = np.linspace(0, 1, 50)
     theirs = np.exp(-((phases[:, None] - np.linspace(0, 1, 8)) ** 2) / (2.0 * 0.1))
-    np.testing.assert_allclose(Gaussian(8, math.sqrt(0.1))(phases), theirs, rtol=1e-12)
+    np.testing.assert_allclose(Gaussian(8, math.sqrt(0.1), margin=0.0)(phases), theirs, rtol=1e-12)
 
 
 @given(ANY)
@@ -161,9 +171,9 @@ def test_a_basis_is_made_again_from_its_parameters(basis: Basis) -> None:
 
 
 def test_equal_bases_are_equal_whether_the_width_was_named_or_not() -> None:
-    assert Gaussian(8) == Gaussian(8, 1 / 7)
+    assert Gaussian(8) == Gaussian(8, 1 / 5) == Gaussian(8, margin=1.0)
     assert Periodic(8) == Periodic(8, 1 / 8)
-    assert len({Gaussian(8), Gaussian(8, 1 / 7), Gaussian(9), Sigmoid(8), Periodic(8), Polynomial(7)}) == 5
+    assert len({Gaussian(8), Gaussian(8, 1 / 5), Gaussian(9), Sigmoid(8), Periodic(8), Polynomial(7)}) == 5
     assert [basis.periodic for basis in EXAMPLES] == [False, False, False, True]
 
 
@@ -198,9 +208,9 @@ def test_the_largest_polynomial_is_still_finite() -> None:
 def test_make_names_what_is_wrong() -> None:
     with pytest.raises(OptionError, match="'fourier'; one of gaussian, sigmoid, polynomial, periodic"):
         make("fourier", size=3)
-    with pytest.raises(OptionError, match="arguments are size, width, got size, degree"):
+    with pytest.raises(OptionError, match="arguments are size, width, margin, got size, degree"):
         make("gaussian", size=3, degree=2)
-    with pytest.raises(OptionError, match="'size'; its arguments are size, width, got none"):
+    with pytest.raises(OptionError, match="'size'; its arguments are size, width, margin, got none"):
         make("gaussian")
     with pytest.raises(OptionError, match="arguments are degree, got size"):
         make("polynomial", size=3)

@@ -83,7 +83,7 @@ def test_jitter_of_the_clock_is_no_fault(rng: np.random.Generator) -> None:
 
 def test_a_fast_movement_that_announces_itself_is_no_jump() -> None:
     times, values = clean()
-    values[:, HAND_X] += np.interp(np.arange(len(times)), range(60, 67), [0, 0.02, 0.12, 0.35, 0.75, 0.95, 1])
+    values[:, HAND_X] = np.interp(np.arange(len(times)), range(60, 67), [0, 0.02, 0.1, 0.33, 0.75, 0.95, 1])
     assert found(times, values) == []
 
 
@@ -298,12 +298,12 @@ def test_quaternions_off_norm() -> None:
     assert found(times, values) == []
     values[150, HEAD] *= 1.02
     values[151, HEAD] = 0
-    values[200:, HEAD] = values[200:, [8, 7, 6, 5]] * [1, -1, 1, -1]
+    values[152:, HEAD] = values[152:, [8, 7, 6, 5]] * [1, -1, 1, -1]
     findings = check_episode("one", times, values, CHANNELS)
     (finding,) = [f for f in findings if f.kind is FindingKind.NORM]
     assert (finding.channel, finding.time) == ("head_q", times[150])
     assert finding.message == "expected norm 1, got 0 at 2.5167 s (2 samples are off)"
-    assert [f.time for f in findings if f.kind is FindingKind.JUMP] == [times[200]], (
+    assert [f.time for f in findings if f.kind is FindingKind.JUMP] == [times[152]], (
         "the rest is looked at all the same"
     )
 
@@ -418,7 +418,8 @@ WILD = st.sampled_from([0.0, -0.0, 1.0, 2.0, -5.0, np.nan, np.inf, -np.inf, 1e30
 @given(hnp.arrays(np.float64, st.tuples(st.integers(0, 8), st.just(1 + len(NAMES))), elements=WILD))
 def test_any_numbers_can_be_checked(cells: np.ndarray) -> None:
     wild = cells[:, 0], cells[:, 1:]
-    check([("one", *wild), ("two", *clean()), ("three", *wild)], CHANNELS)
+    for finding in check([("one", *wild), ("two", *clean()), ("three", *wild)], CHANNELS):
+        assert finding.time is None or np.isfinite(finding.time)
 
 
 def test_shapes_that_do_not_fit_are_refused() -> None:

@@ -143,6 +143,7 @@ BAD_CSV = {
     "text in time": ("time,x\nnow,1\n", "line 2, channel 'time': expected a number, got 'now'"),
     "text after gap": ("time,x,y\n0,,2\n0.1,3,?\n", "line 3, channel 'y': expected a number, got '?'"),
     "underscore": ("time,x\n0,1_000\n", "line 2, channel 'x': expected a number, got '1_000'"),
+    "line break": ('time,"x\ny"\n0,?\n', "line 3, channel 'x y': expected a number, got '?'"),
     "open quote": ('time,x\n0,"1\n', "line 2: expected cells between ','"),
     "not text": (b"time,x\n0,1\n0.1,\xff\n", "line 3: expected text in UTF-8, got the byte 0xff"),
     "null byte": ("time,x\n0,1\0\n", "line 2"),

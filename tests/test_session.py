@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 from interactions import (
     CONTROLLED,
@@ -548,8 +548,9 @@ SAMPLES = st.lists(
 
 @NAMES
 @pytest.mark.parametrize("periodic", [False, True])
-@settings(max_examples=25)
+@settings(max_examples=25, phases=(Phase.explicit, Phase.reuse, Phase.generate))  # shrinking would take minutes
 @given(SAMPLES)
+@example([(0.0, {"lift": 0.0}), (0.25, {"reach": 2e37, "lift": 0.0}), (0.25, {"reach": 2e175}), (0.25, {"reach": 0.0})])
 @example([(0.0, {"reach": 1e308, "lift": -1.7e308, "turn": 1.7e308}), (0.1, {"reach": 0.1})])
 @example([(0.0, {"reach": 1e160}), (0.0, {"reach": 1e152}), (1e-308, {"reach": 0.0}), (300.0, {"lift": 0.0})])
 def test_no_sample_at_all_breaks_a_control_loop(

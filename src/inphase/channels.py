@@ -94,7 +94,7 @@ def make_channels(
 
 
 def check_channels(channels: Sequence[Channel]) -> None:
-    """Raise ChannelError for a name that stands twice, controlled channels before observed ones, a broken quaternion."""
+    """Raise ChannelError for a name that stands twice, controlled before observed channels, or a broken quaternion."""
     check_unique([channel.name for channel in channels])
     roles = [channel.role for channel in channels]
     if roles != sorted(roles, key=lambda role: role is Role.CONTROLLED):

@@ -9,30 +9,40 @@ import numpy as np
 from jaxtyping import Float
 
 from inphase.arrays import frozen
-from inphase.basis.basis import arguments, clipped, positive, settle, spread, whole
+from inphase.basis.basis import arguments, clipped, positive, settle, whole
+from inphase.errors import OptionError
 
 
 @dataclass(frozen=True)
 class Gaussian:
-    """`size` Gaussians exp(-(φ - c)² / (2 width²)), their centres c uniform on [0, 1], both ends included (4.2.1).
+    """`size` Gaussians exp(-(φ - c)² / (2 width²)), their centres c uniform (4.2.1).
 
     width: standard deviation [phase]; None takes the distance between two centres. There the sum has stopped to ripple
-    (by 5e-9 of its height) while neighbours still differ: the condition number of ΦᵀΦ stays below 1e4 at any size. At
+    (by 5e-9 of its height) while neighbours still differ: the condition number of ΦᵀΦ stays below 1e5 at any size. At
     0.7 of the distance the ripple is 1e-4; at 1.5 the condition number is 1e8, and weights grow that fit no better.
-    IntPrim's `GaussianModel(8, 0.1)` names the variance: the width is sqrt(0.1).
-    Raises OptionError for fewer than two functions, or a width that is not positive.
+    margin: how far the outer centres lie beyond 0 and 1, in distances between two; None takes 1, or what so few leave.
+    With the outer ones at the ends, as in 4.2.1 (margin 0), half of the neighbours are missing there, and a hand that
+    rests at the end of a movement cannot be held still to better than 3 % of its way.
+    IntPrim's `GaussianModel(8, 0.1)` names the variance: the width is sqrt(0.1), the margin 0.
+    Raises OptionError for fewer than two functions, a width that is not positive, or a margin that leaves no distance.
     """
 
     size: int
     width: float | None = None
+    margin: float | None = None
     periodic: ClassVar[bool] = False
     _centres: Float[np.ndarray, " B"] = field(init=False, repr=False, compare=False)
     _scale: float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         size = whole("Gaussian size", self.size, least=2)
-        width = positive("Gaussian width", self.width, default=1 / (size - 1))
-        settle(self, size=size, width=width, _centres=frozen(spread(size)), _scale=1 / width)
+        margin = min(1.0, size / 2 - 1) if self.margin is None else float(self.margin)
+        if not 0 <= margin < (size - 1) / 2:
+            raise OptionError(f"Gaussian margin: expected 0 <= margin < {(size - 1) / 2:g}, got {self.margin!r}")
+        distance = 1 / (size - 1 - 2 * margin)
+        width = positive("Gaussian width", self.width, default=distance)
+        centres = frozen((np.arange(size) - margin) * distance)
+        settle(self, size=size, width=width, margin=margin, _centres=centres, _scale=1 / width)
 
     def __call__(self, phases: Float[np.ndarray, "*P"]) -> Float[np.ndarray, "*P B"]:
         distance = (clipped(phases)[0] - self._centres) * self._scale

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+ABSURD = 1e8  # standard deviations: numbers that would only blow the belief up
+
 
 @dataclass(frozen=True)
 class InnovationScore:
@@ -24,7 +26,10 @@ class InnovationScore:
 
 
 def innovation_score(innovation: Float[np.ndarray, " M"], cov: Float[np.ndarray, "M M"]) -> InnovationScore | None:
-    """The Gaussian log-density of an innovation under its covariance S (Eq. 2.7); None where S is not one."""
+    """The Gaussian log-density of an innovation under its covariance S (Eq. 2.7).
+
+    None where S is no covariance, or the innovation so many standard deviations off that it is no reading.
+    """
     try:
         root = np.linalg.cholesky(cov)
     except np.linalg.LinAlgError:
@@ -35,6 +40,6 @@ def innovation_score(innovation: Float[np.ndarray, " M"], cov: Float[np.ndarray,
     with np.errstate(over="ignore", invalid="ignore"):  # an absurd reading is caught below
         surprise = float(white @ white)
     log_det = 2 * float(np.log(np.diag(root)).sum())
-    if not (np.isfinite(surprise) and np.isfinite(log_det)):
+    if not (surprise <= ABSURD**2 * len(innovation) and np.isfinite(log_det)):
         return None
     return InnovationScore(root, -0.5 * (surprise + log_det + len(innovation) * np.log(2 * np.pi)), surprise)

@@ -111,6 +111,9 @@ def _near(path: Path) -> str:
     if not folder.is_dir():
         missing = next((p for p in reversed(path.parents) if not p.exists()), folder)
         return f": there is no folder {missing}"
-    names = sorted(entry.name for entry in folder.iterdir())
+    try:
+        names = sorted(entry.name for entry in folder.iterdir())
+    except OSError as error:
+        return f"; {folder} cannot be read: {error.strerror}"
     near = difflib.get_close_matches(path.name, names, n=5, cutoff=0.6)
     return f"; near it: {listing(near)}" if near else f"; in {folder} there is {listing(names)}"

@@ -15,7 +15,8 @@ from inphase.noise import Noise
 from inphase.training.noise import SMALLEST_STD, correlation_time
 
 GRID = 200  # phases at which curves are compared
-ROUNDS = 3  # the noise decides how far the others are bent, which decides the noise: it settles at once
+ROUNDS = 50  # at most: the noise decides how far the others are bent, which decides the noise …
+SETTLED = 0.01  # … until it moves by less than this share
 
 
 def held_out_noise(
@@ -31,7 +32,9 @@ def held_out_noise(
     var = np.maximum(curves.var(0).mean(0), SMALLEST_STD**2)
     for _ in range(ROUNDS):
         left = _left_out(curves, shown, var)
-        var = np.maximum((left**2).mean((0, 1)), SMALLEST_STD**2)
+        before, var = var, np.maximum((left**2).mean((0, 1)), SMALLEST_STD**2)
+        if (np.abs(var - before) < SETTLED * before).all():
+            break
     times = np.mean([correlation_time(duration * grid, curve) for curve in left], axis=0)
     return Noise(var, times)
 

@@ -49,11 +49,11 @@ def fit(
     coordinates = Coordinates.learn(dataset.channels, values)
     features = [coordinates.from_channels(v) for v in values]
     scaling = scaling if scaling is not None else Scaling.learn(coordinates.groups, features)
+    if len(scaling.low) != coordinates.count:
+        raise OptionError(f"scaling: expected {coordinates.count} features, got {len(scaling.low)}")
     layout = Layout(_bases(basis, dataset, coordinates, phase.periodic))
     scaled = [scaling.scale(f) for f in features]
     times, phases = [d.times for d in dataset], [d.phases for d in dataset]
-    if len(scaling.low) != coordinates.count:
-        raise OptionError(f"scaling: expected {coordinates.count} features, got {len(scaling.low)}")
     weights, _ = fit_weights(layout, phases, scaled, names=coordinates.names)
     if noise is None:
         shown = [dataset.channels[positions[0]].role is Role.OBSERVED for positions in coordinates.channel_of]

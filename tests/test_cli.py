@@ -1,0 +1,631 @@
+"""The command line: what it says, what it refuses in one line, and that it never leaves half of anything."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from interactions import curves
+from numpy.testing import assert_allclose
+from rich.status import Status
+
+import inphase
+from inphase.basis import FAMILIES, Gaussian, Periodic, Polynomial, Sigmoid
+from inphase.cli import console, main
+from inphase.cli.basis_text import parse_basis, show_basis
+from inphase.evaluation import replay
+from inphase.io.csv import write_csv
+
+NAMES = ("hand_x", "hand_y", "robot_x", "robot_y")
+ROLES = ["--observed", "hand_?", "--controlled", "robot_?"]
+
+
+# --------------------------------------------------------------------------------------------------------- recordings
+
+
+def episode(seed: int, samples: int = 60) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and values of one interaction in a style of its own."""
+    rng = np.random.default_rng(seed)
+    times = np.linspace(0, 2 + 0.1 * rng.standard_normal(), samples)
+    values = curves(times / times[-1], rng.standard_normal(2))
+    return times, values + 0.005 * rng.standard_normal(values.shape)
+
+
+def write(folder: Path, count: int = 4, names: tuple[str, ...] = NAMES, **options: Any) -> list[Path]:
+    folder.mkdir()
+    paths = []
+    for i in range(count):
+        paths.append(folder / f"episode_{i}.csv")
+        times, values = episode(i, **options)
+        write_csv(paths[-1], names, times, values[:, : len(names)])
+    return paths
+
+
+def edit(path: Path, change: Callable[[list[str]], list[str]]) -> None:
+    path.write_text("\n".join(change(path.read_text().splitlines())) + "\n")
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder to work in, with good recordings, a model of them, and no terminal that is as wide as mine."""
+    write(tmp_path / "good")
+    inphase.fit(inphase.load(tmp_path / "good", "hand_?", "robot_?")).save(tmp_path / "good.inphase")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("COLUMNS", raising=False)
+    return tmp_path
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    """Run a command in this process: exit code, output, errors."""
+
+    def command(*arguments: object) -> tuple[int, str, str]:
+        try:
+            code = main([str(argument) for argument in arguments])
+        except SystemExit as end:
+            code = int(end.code or 0)
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return command
+
+
+def tree(folder: Path) -> dict[str, bytes | None]:
+    """All that is in a folder."""
+    return {str(p.relative_to(folder)): p.read_bytes() if p.is_file() else None for p in folder.rglob("*")}
+
+
+# ---------------------------------------------------------------------------------------------------------- bad input
+
+
+def empty(folder: Path) -> None:
+    (folder / "empty").mkdir()
+
+
+def missing_column(folder: Path) -> None:
+    paths = write(folder / "missing_column")
+    write_csv(paths[2], NAMES[:3], *(part[:, :3] if part.ndim == 2 else part for part in episode(2)))
+
+
+def wrong_delimiter(folder: Path) -> None:
+    for path in write(folder / "wrong_delimiter"):
+        path.write_text(path.read_text().replace(",", ";"))
+
+
+def text_in_a_number(folder: Path) -> None:
+    path = write(folder / "text_in_a_number")[1]
+    edit(path, lambda lines: [*lines[:6], "0.2,0.1,oops,0.3,0.4", *lines[7:]])
+
+
+def one_demonstration(folder: Path) -> None:
+    write(folder / "one_demonstration", count=1)
+
+
+def two_samples(folder: Path) -> None:
+    write(folder / "two_samples", samples=2)
+
+
+def never_moves(folder: Path) -> None:
+    for path in write(folder / "never_moves"):
+        edit(path, lambda lines: [lines[0], *(",".join([*line.split(",")[:4], "7.5"]) for line in lines[1:])])
+
+
+def backwards(folder: Path) -> None:
+    edit(write(folder / "backwards")[3], lambda lines: [*lines[:10], lines[11], lines[10], *lines[12:]])
+
+
+def another_data_set(folder: Path) -> None:
+    write(folder / "another_data_set", names=("paw_x", "paw_y", "tail"))
+
+
+def not_a_model(folder: Path) -> None:
+    (folder / "not_a_model.inphase").write_text("time,hand_x\n0,1\n")
+
+
+def damaged_model(folder: Path) -> None:
+    content = (folder / "good.inphase").read_bytes()
+    (folder / "damaged_model.inphase").write_bytes(content[:-100])
+
+
+def nothing(folder: Path) -> None:
+    """All that is needed is that something is not there."""
+
+
+FIT = ["-o", "new.inphase", *ROLES]
+
+BAD = [
+    # what makes it, the command, what its line says: file, channel, expected, got
+    (empty, ["fit", "empty", *FIT], ["empty: expected .csv or .npz files", "found none"]),
+    (empty, ["validate", "empty"], ["empty: expected .csv or .npz files"]),
+    (empty, ["inspect", "empty"], ["empty: expected .csv or .npz files"]),
+    (empty, ["replay", "good.inphase", "empty"], ["empty: expected .csv or .npz files"]),
+    (missing_column, ["fit", "missing_column", *FIT], ["missing_column/episode_2.csv", "'robot_y'", "hand_x, hand_y"]),
+    (wrong_delimiter, ["fit", "wrong_delimiter", *FIT], ["episode_0.csv: expected ','", "found ';'", "--delimiter"]),
+    (wrong_delimiter, ["validate", "wrong_delimiter"], ["episode_0.csv: expected ','", "found ';'"]),
+    (
+        text_in_a_number,
+        ["fit", "text_in_a_number", *FIT],
+        ["text_in_a_number/episode_1.csv, line 7, channel 'hand_y': expected a number, got 'oops'"],
+    ),
+    (
+        text_in_a_number,
+        ["replay", "good.inphase", "text_in_a_number/episode_1.csv"],
+        ["episode_1.csv, line 7, channel 'hand_y': expected a number, got 'oops'"],
+    ),
+    (one_demonstration, ["fit", "one_demonstration", *FIT], ["at least 2 demonstrations", "got 1 (episode_0)"]),
+    (two_samples, ["fit", "two_samples", *FIT], ["two_samples/episode_0.csv: expected at least 3 samples, got 2"]),
+    (two_samples, ["replay", "good.inphase", "two_samples"], ["episode_0.csv: expected at least 3 samples, got 2"]),
+    (never_moves, ["fit", "never_moves", *FIT], ["channel 'robot_y': expected a channel that moves, got 7.5"]),
+    (backwards, ["fit", "backwards", *FIT], ["backwards/episode_3.csv: expected times that increase, got", "after"]),
+    (backwards, ["inspect", "backwards"], ["backwards/episode_3.csv: expected times that increase, got", "sample 10"]),
+    (
+        another_data_set,
+        ["replay", "good.inphase", "another_data_set"],
+        ["episode_0: not what the model was trained on: expected channels hand_x, hand_y; got paw_x, paw_y, tail"],
+    ),
+    (another_data_set, ["fit", "another_data_set", *FIT], ["episode_0.csv: no channel fits 'hand_?'", "paw_x, paw_y"]),
+    (nothing, ["fit", "nowhere", *FIT], ["nowhere: no such file or folder"]),
+    (nothing, ["fit", "nowhere/*.csv", *FIT], ["nowhere/*.csv: nothing fits the pattern"]),
+    (nothing, ["validate", "good/episode_9.csv"], ["good/episode_9.csv: no such file or folder", "episode_0.csv"]),
+    (nothing, ["replay", "nowhere.inphase", "good"], ["nowhere.inphase: cannot be read: No such file"]),
+    (nothing, ["inspect", "nowhere.inphase"], ["nowhere.inphase: cannot be read: No such file"]),
+    (not_a_model, ["inspect", "not_a_model.inphase"], ["not_a_model.inphase: not an inphase model", "got b'time,han'"]),
+    (not_a_model, ["replay", "not_a_model.inphase", "good"], ["not_a_model.inphase: not an inphase model"]),
+    (nothing, ["replay", "good/episode_0.csv", "good.inphase"], ["episode_0.csv: not an inphase model"]),
+    (damaged_model, ["replay", "damaged_model.inphase", "good"], ["damaged_model.inphase: cut short or damaged"]),
+    (nothing, ["replay", "good.inphase", "good", "--filter", "oracle"], ["filter 'oracle'", "bip, ebip"]),
+    (nothing, ["replay", "good.inphase", "good", "--members", "1"], ["at least 2 members, got 1"]),
+    (nothing, ["replay", "good.inphase", "good", "--filter", "bip", "--members", "9"], ["'bip' has no option members"]),
+    (nothing, ["replay", "good.inphase", "good", "--picture", "a.docx"], ["'a.docx'", ".png, .svg, .pdf"]),
+    (nothing, ["replay", "good.inphase", "good", "--picture", "no/a.png"], ["no/a.png", "folder no to exist"]),
+    (nothing, ["fit", "good", *ROLES, "-o", "no/a.inphase"], ["no/a.inphase: expected the folder no to exist"]),
+    (nothing, ["fit", "good", *ROLES, "-o", "good"], ["good: expected a file name, got a folder"]),
+    (nothing, ["fit", "good", *FIT, "--basis", "wavelet:9"], ["'wavelet'", "gaussian, sigmoid, polynomial, periodic"]),
+    (nothing, ["fit", "good", *FIT, "--basis", "gaussian"], ["--basis: expected family:size", "got 'gaussian'"]),
+    (nothing, ["fit", "good", *FIT, "--basis", "gaussian:many"], ["--basis: expected family:size", "'gaussian:many'"]),
+    (nothing, ["fit", "good", *FIT, "--basis", "gaussian:9:1:1"], ["--basis: expected family:size"]),
+    (nothing, ["fit", "good", *FIT, "--basis", "polynomial:5:0.1"], ["polynomial", "arguments are degree"]),
+    (nothing, ["fit", "good", *FIT, "--basis", "gaussian:9", "--periodic"], ["both periodic or both not"]),
+    (nothing, ["fit", "good", *FIT, "--order", "3"], ["order 0, 1 or 2, got 3"]),
+    (nothing, ["fit", "good", "--observed", "paw_?", "--controlled", "robot_?"], ["no channel fits 'paw_?'", "hand_x"]),
+    (nothing, ["fit", "good", "--observed", "hand_?", "*_x", "--controlled", "robot_?"], ["as both: robot_x"]),
+    (nothing, ["fit", "good", "--observed", "hand_?"], ["--observed and --controlled", "hand_x, hand_y, robot_x"]),
+    (nothing, ["fit", "good"], ["--observed and --controlled", "good/episode_0.csv", "hand_x, hand_y, robot_x"]),
+    (nothing, ["fit", *FIT], ["expected at least one file, folder or pattern, got none"]),
+    (nothing, ["validate"], ["expected at least one file, folder or pattern, got none"]),
+    (nothing, ["replay", "good.inphase"], ["expected at least one file, folder or pattern, got none"]),
+    (nothing, ["fit", "good", *FIT, "--time", "clock"], ["no column 'clock'", "time, hand_x"]),
+    (nothing, ["fit", "good", *FIT, "--delimiter", "::"], ["a delimiter of one character", "got '::'"]),
+    (nothing, ["fit", "good", *FIT, "--quaternion", "hand_x"], ["quaternion 'hand'", "got hand_x"]),
+    (nothing, ["fit", "good", *FIT, "--angle", "elbow"], ["no channel fits 'elbow'", "hand_x"]),
+    (nothing, ["demo", "--shapes", "Sine", "Rhombus"], ["shape Rhombus; the shapes are", "Sine"]),
+    (nothing, ["demo", "--shapes"], ["at least one shape", "got none"]),
+    (nothing, ["demo", "--filter", "oracle"], ["filter 'oracle'", "bip, ebip"]),
+    (nothing, ["demo", "-o", "good.inphase"], ["good.inphase: expected a folder, got a file"]),
+]
+
+
+@pytest.mark.parametrize(("make", "command", "words"), BAD, ids=[" ".join(command)[:60] for _, command, _ in BAD])
+def test_bad_input_gives_one_clear_line_and_nothing_else(make, command, words, here, run):
+    make(here)
+    before = tree(here)
+    code, out, err = run(*command)
+    assert code == 2
+    assert out == ""
+    assert err.startswith("inphase: ")
+    assert err.count("\n") == 1
+    assert [word for word in words if word not in err] == []
+    assert tree(here) == before
+
+
+@pytest.mark.parametrize("command", [[], ["dance"], ["fit", "good", "--observe"], ["replay"], ["demo", "--seed", "x"]])
+def test_wrong_arguments_are_refused(command, here, run):
+    before = tree(here)
+    code, out, err = run(*command)
+    assert code == 2
+    assert out == ""
+    assert "help" in err
+    assert "Traceback" not in err
+    assert tree(here) == before
+
+
+def test_an_error_of_many_lines_is_told_in_one(here, run, monkeypatch):
+    def fail(*_: object) -> None:
+        raise inphase.DataError("one\ntwo\n   three")
+
+    monkeypatch.setattr("inphase.cli.validate.find_episodes", fail)
+    assert run("validate", "good") == (2, "", "inphase: one two three\n")
+
+
+def test_a_disk_that_is_full_is_told_in_one_line(here, run, monkeypatch):
+    def fail(self: Path, content: bytes) -> None:
+        raise OSError(28, "No space left on device", str(self))
+
+    monkeypatch.setattr(Path, "write_bytes", fail)
+    before = tree(here)
+    code, out, err = run("fit", "good", *FIT)
+    assert (code, out) == (2, "")
+    assert "No space left on device" in err
+    assert err.count("\n") == 1
+    assert tree(here) == before
+
+
+@pytest.mark.parametrize(
+    "at", ["inphase.cli.fit.fit_model", "inphase.cli.reading.load", "pathlib.Path.write_bytes"]
+)
+def test_an_interrupt_leaves_nothing(at, here, run, monkeypatch):
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    before = tree(here)
+    monkeypatch.setattr(at, interrupted)
+    assert run("fit", "good", *FIT) == (130, "", "inphase: stopped\n")
+    assert tree(here) == before
+
+
+# --------------------------------------------------------------------------------------------------------- fit, inspect
+
+
+def test_fit_learns_what_the_library_learns(here, run):
+    code, out, err = run("fit", "good", *FIT)
+    assert (code, err) == (0, "")
+    model = inphase.Model.load("new.inphase")
+    expected = inphase.fit(inphase.load("good", "hand_?", "robot_?"))
+    assert (model.observed, model.controlled) == (("hand_x", "hand_y"), ("robot_x", "robot_y"))
+    assert_allclose(model.prior.samples, expected.prior.samples)
+    assert "2 observed and 2 controlled channels, 4 demonstrations, 48 basis weights" in out
+    assert "wrote new.inphase (3 kB)" in out
+    assert [name for name in NAMES if name not in out] == []
+
+
+def test_fit_is_told_what_to_do(here, run):
+    assert run("fit", "good", *FIT, "--basis", "sigmoid:7:0.1", "--order", "2")[0] == 0
+    model = inphase.Model.load("new.inphase")
+    assert set(model.layout.bases) == {Sigmoid(7, 0.1)}
+    assert model.phase.order == 2
+    assert run("fit", "good", *FIT, "--periodic", "--angle", "robot_x", "--trim")[0] == 0
+    model = inphase.Model.load("new.inphase")
+    assert model.phase.periodic
+    assert [c.kind.value for c in model.channels] == ["linear", "linear", "angle", "linear"]
+
+
+def test_columns_are_separated_as_told(here, run):
+    for path in (here / "good").iterdir():
+        path.write_text(path.read_text().replace(",", "\t").replace("time", "clock"))
+    for delimiter in ("tab", "\\t", "\t"):
+        assert run("fit", "good", *FIT, "--time", "clock", "--delimiter", delimiter)[0] == 0
+    assert run("replay", "new.inphase", "good", "--time", "clock", "--delimiter", "tab")[0] == 0
+    assert run("validate", "good", "--time", "clock", "--delimiter", "tab")[0] == 0
+
+
+def test_the_card_of_a_model_holds_its_figures(here, run):
+    code, out, err = run("inspect", "good.inphase", "--json")
+    assert (code, err) == (0, "")
+    card, model = json.loads(out), inphase.Model.load("good.inphase")
+    assert card["observed"] == ["hand_x", "hand_y"]
+    assert card["typical_duration"] == 1 / model.phase.nominal_velocity
+    assert [row["feature"] for row in card["features"]] == list(NAMES)
+    spans = model.scaling.high - model.scaling.low
+    assert_allclose([row["noise_std"] for row in card["features"]], spans * np.sqrt(model.noise.var))
+    assert {parse_basis(row["basis"]) for row in card["features"]} == set(model.layout.bases)
+    # `fit` says the same of the model that it writes.
+    fitted = json.loads(run("fit", "good", *FIT, "--json")[1])
+    assert fitted.pop("model") == "new.inphase"
+    assert fitted == card
+
+
+def test_the_card_of_recordings_holds_their_figures(here, run):
+    card = json.loads(run("inspect", "good", *ROLES, "--json")[1])
+    times, _ = episode(2)
+    assert card["episodes"][2] == {
+        "name": "episode_2",
+        "samples": 60,
+        "duration": pytest.approx(times[-1]),
+        "rate": pytest.approx(59 / times[-1]),
+    }
+    everything = np.concatenate([episode(i)[1] for i in range(4)])
+    assert [c["low"] for c in card["channels"]] == everything.min(axis=0).tolist()
+    assert [c["role"] for c in card["channels"]] == ["observed"] * 2 + ["controlled"] * 2
+    assert [c["missing"] for c in card["channels"]] == [0.0] * 4
+
+
+def test_a_channel_that_was_never_seen_is_shown_as_such(here, run):
+    for i in range(4):
+        times, values = episode(i)
+        write_csv(Path(f"good/episode_{i}.csv"), NAMES, times, np.column_stack([values[:, :3], np.full(60, np.nan)]))
+    assert json.loads(run("inspect", "good", "--json")[1])["channels"][3]["low"] is None
+    row = next(line for line in run("inspect", "good")[1].splitlines() if line.startswith("robot_y"))
+    assert "100.0 %" in row
+
+
+@pytest.mark.parametrize(
+    "basis", [Gaussian(9), Gaussian(9, 0.25), Sigmoid(5), Polynomial(4), Periodic(7), Periodic(6, 0.2)]
+)
+def test_a_basis_is_read_as_it_is_shown(basis):
+    assert parse_basis(show_basis(basis)) == basis
+
+
+def test_every_family_can_be_named():
+    assert {type(parse_basis(f"{family}:5")) for family in FAMILIES} == set(FAMILIES.values())
+
+
+# ------------------------------------------------------------------------------------------------------------- replay
+
+
+def test_replay_says_what_the_library_says(here, run):
+    code, out, err = run("replay", "good.inphase", "good/episode_1.csv", "--filter", "bip", "--json")
+    assert (code, err) == (0, "")
+    (found,) = json.loads(out)
+    model = inphase.Model.load("good.inphase")
+    played = replay(model, inphase.Demonstration(*episode(1)), filter="bip")
+    assert (found["episode"], found["filter"]) == ("episode_1", "bip")
+    assert found["nmse"] == pytest.approx(played.now.nmse)
+    assert found["coverage"] == pytest.approx(played.now.coverage)
+    assert found["nll"] == pytest.approx(played.now.nll)
+    assert found["final_pose_50"] == pytest.approx(played.final_pose(0.5))
+    assert found["log_likelihood"] == pytest.approx(played.log_likelihood)
+    assert 0 < found["step_time"] < 10
+    assert {"clock_nmse", "clock_coverage", "clock_nll"} <= set(found)
+
+
+def test_replay_prints_as_it_goes_and_what_came_of_it(here, run):
+    out = run("replay", "good.inphase", "good/episode_1.csv", "--seed", 3)[1].splitlines()
+    assert out[0].startswith("episode_1: 60 samples")
+    assert out[1].split() == ["time", "[s]", "phase", "pace", "error", "inside", "status"]
+    rows = [line.split() for line in out[2:12]]
+    assert len(rows) == 10
+    times = [float(row[0]) for row in rows]
+    assert times == sorted(times)
+    assert times[-1] == pytest.approx(episode(1)[0][-1], abs=0.01)
+    (found,) = json.loads(run("replay", "good.inphase", "good/episode_1.csv", "--seed", 3, "--json")[1])
+    (line,) = [line for line in out if line.startswith("episode_1 ")]
+    assert float(line.split()[1]) == pytest.approx(found["nmse"], abs=6e-4)
+    assert line.split()[2] == f"{100 * found['coverage']:.0f}"
+    assert rows[-1][6] == line.split()[2]  # the share inside so far, at the end
+
+
+def test_replay_of_many_is_a_row_each_and_their_mean(here, run):
+    out = run("replay", "good.inphase", "good", "--filter", "bip")[1]
+    results = json.loads(run("replay", "good.inphase", "good", "--filter", "bip", "--json")[1])
+    assert [found["episode"] for found in results] == [f"episode_{i}" for i in range(4)]
+    assert "time [s]" not in out
+    (mean,) = [line.split() for line in out.splitlines() if line.startswith("mean ")]
+    assert float(mean[1]) == pytest.approx(np.mean([found["nmse"] for found in results]), abs=6e-4)
+
+
+def test_trouble_is_named_in_the_table_and_told_below(here, run):
+    times, values = episode(1)
+    values[20:40, :2] = np.nan
+    values[45:, :2] += 3.0
+    write_csv(Path("odd.csv"), NAMES, times, values)
+    out = run("replay", "good.inphase", "odd.csv")[1]
+    rows = [line for line in out.splitlines()[2:12] if "±" in line]
+    assert any(line.endswith("  blind") for line in rows)
+    assert any(line.endswith("  unlike") for line in rows)
+    assert "blind, " in out
+    assert inphase.Status.BLIND.value in out
+    assert "unlike, " in out
+    assert inphase.Status.UNLIKE.value in out
+
+
+def test_what_was_not_recorded_is_answered_and_not_scored(here, run):
+    times, values = episode(1)
+    write_csv(Path("alone.csv"), NAMES[:2], times, values[:, :2])
+    (found,) = json.loads(run("replay", "good.inphase", "alone.csv", "--json")[1])
+    assert found["nmse"] is None
+    assert found["clock_nmse"] is None
+    code, out, err = run("replay", "good.inphase", "alone.csv", "--picture", "alone.png")
+    assert (code, err) == (0, "")
+    assert "–" in out
+    assert Path("alone.png").exists()
+
+
+def test_names_are_shown_as_they_are(here, run):
+    names = ("force[x]", ":smile:", "[bold]a", "b[/]")
+    write(here / "odd", names=names)
+    roles = ["--observed", *names[:2], "--controlled", *names[2:]]
+    for command in (["fit", "odd", *roles, "-o", "odd.inphase"], ["inspect", "odd.inphase"], ["inspect", "odd"]):
+        code, out, _ = run(*command)
+        assert code == 0
+        assert [name for name in names if name not in out] == []
+
+
+# ----------------------------------------------------------------------------------------------------------- validate
+
+
+def test_validate_names_episode_channel_and_time_and_rejects_nothing(here, run):
+    write(here / "faulty", count=6)
+    times, values = episode(1)
+    values[30, 1] += 4.0
+    write_csv(Path("faulty/episode_1.csv"), NAMES, times, values)
+    edit(here / "faulty" / "episode_3.csv", lambda lines: [*lines[:20], lines[19], *lines[20:]])
+    (here / "faulty" / "episode_4.csv").write_text("time;hand_x\n")
+    edit(here / "faulty" / "episode_5.csv", lambda lines: [line.rsplit(",", 1)[0] for line in lines])
+    before = tree(here)
+    code, out, err = run("validate", "faulty", "--json")
+    assert (code, err) == (1, "")
+    found = {(f["episode"], f["channel"], f["kind"]): f for f in json.loads(out)}
+    assert found[("episode_1", "hand_y", "jump")]["time"] == pytest.approx(times[30])
+    assert found[("episode_1", "hand_y", "jump")]["severity"] == "warning"
+    assert found[("episode_3", None, "backwards")]["severity"] == "error"
+    assert found[("episode_3", None, "backwards")]["time"] == pytest.approx(episode(3)[0][18], abs=1e-3)
+    assert "faulty/episode_4.csv" in found[("episode_4", None, "unreadable")]["message"]
+    assert "'robot_y'" in found[("episode_5", None, "unreadable")]["message"]
+    assert {episode for episode, _, _ in found} == {"episode_1", "episode_3", "episode_4", "episode_5"}
+    table = run("validate", "faulty")[1]
+    (row,) = [line.split() for line in table.splitlines() if " jump " in line]
+    assert row[:4] == ["episode_1", "hand_y", f"{times[30]:.3f}", "jump"]
+    assert "6 episodes, 4 channels: 4 with findings" in table
+    assert tree(here) == before
+
+
+def test_the_odd_one_out_is_told_of_even_if_it_is_the_first(here, run):
+    edit(here / "good" / "episode_0.csv", lambda lines: [line.rsplit(",", 1)[0] for line in lines])
+    for roles in ([], ROLES):
+        code, out, _ = run("validate", "good", *roles)
+        assert code == 1
+        assert "no channel 'robot_y'" in out
+        assert "4 episodes, 4 channels: 1 with findings" in out
+
+
+def test_nothing_found_is_said(here, run):
+    assert run("validate", "good") == (0, "4 episodes, 4 channels: nothing found\n", "")
+    assert run("validate", "good", "--json") == (0, "[]\n", "")
+    assert run("validate", "good/episode_1.csv", "--observed", "hand_x")[1].startswith("1 episode, 1 channel: ")
+
+
+def test_a_channel_that_never_moves_is_a_warning(here, run):
+    never_moves(here)
+    code, out, _ = run("validate", "never_moves")
+    assert code == 0
+    assert "robot_y" in out
+    assert "always 7.5" in out
+
+
+# ------------------------------------------------------------------------------------------------------ where it prints
+
+SHOWN = [
+    ["fit", "long", "-o", "long.inphase", "--observed", "left_*", "--controlled", "robot_*"],
+    ["inspect", "good.inphase"],
+    ["inspect", "long"],
+    ["replay", "good.inphase", "good/episode_1.csv"],
+    ["replay", "good.inphase", "good"],
+    ["replay", "good.inphase", "odd/an_episode_with_a_rather_long_name.csv"],
+    ["validate", "odd"],
+    ["demo", "--help"],
+    ["fit", "--help"],
+    ["replay", "--help"],
+    ["validate", "--help"],
+]
+
+
+@pytest.fixture
+def shown(here: Path) -> None:
+    write(here / "long", names=("left_shoulder_x", "left_shoulder_y", "robot_gripper_opening", "robot_joint_7"))
+    (here / "odd").mkdir()
+    times, values = episode(1)
+    values[30, 1] += 4.0
+    values[10:14, 0] = np.nan
+    write_csv(here / "odd" / "an_episode_with_a_rather_long_name.csv", NAMES, times, values)
+
+
+@pytest.mark.parametrize("command", SHOWN, ids=" ".join)
+def test_eighty_columns_are_enough(command, shown, run, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    out = run(*command)[1]
+    assert out
+    assert [line for line in out.splitlines() if len(line) > 80] == []
+    assert "…" not in out.replace("odd/…", "").replace("…rather", "").replace("…ather_long_name", "")
+
+
+def test_in_a_pipe_a_finding_stays_on_its_line(shown, run):
+    out = run("validate", "odd")[1]
+    (row,) = [line for line in out.splitlines() if " jump " in line]
+    assert row.split()[0] == "an_episode_with_a_rather_long_name"
+    assert "all of its movement spans" in row
+
+
+def test_what_is_required_and_what_is_not_is_told(run):
+    out = run("fit", "--help")[1]
+    assert "(required)" in out
+    for clutter in ("default: )", "''", "None", "--no-"):
+        assert clutter not in out
+    assert "(required)" in run("replay", "--help")[1]
+
+
+def command(*arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:
+    """The command line in a process of its own."""
+    environment = {**os.environ, "PYTHONPATH": str(Path(inphase.__file__).parents[1])}
+    program = [sys.executable, "-W", "error", "-m", "inphase.cli"]
+    return subprocess.run([*program, *arguments], text=True, env=environment, **options)
+
+
+def test_a_process_of_its_own(here):
+    result = command("inspect", "good.inphase", "--json", capture_output=True)
+    assert result.returncode == 0, result.stderr
+    assert json.loads(result.stdout)["controlled"] == ["robot_x", "robot_y"]
+    result = command("inspect", "bad.inphase", capture_output=True)
+    assert (result.returncode, result.stdout) == (2, "")
+    assert result.stderr == "inphase: bad.inphase: cannot be read: No such file or directory\n"
+
+
+@pytest.mark.parametrize("arguments", [["inspect", "good.inphase"], ["validate", "good", "--json"], ["--help"]])
+def test_a_reader_that_has_gone_is_no_trouble(arguments, here):
+    reader, writer = os.pipe()
+    os.close(reader)
+    try:
+        result = command(*arguments, stdout=writer, stderr=subprocess.PIPE)
+    finally:
+        os.close(writer)
+    assert (result.returncode, result.stderr) == (0, "")
+
+
+# ----------------------------------------------------------------------------------------------------- a sign of life
+
+
+@pytest.fixture
+def started(monkeypatch: pytest.MonkeyPatch) -> threading.Event:
+    """Set once a sign of life is given; the terminal is a pretence."""
+    event = threading.Event()
+    monkeypatch.setattr(console.Output, "is_terminal", property(lambda self: True))
+    monkeypatch.setattr(Status, "start", lambda self: event.set())
+    return event
+
+
+def test_a_long_wait_is_explained(started, monkeypatch):
+    monkeypatch.setattr(console, "PATIENCE", 0.0)
+    with console.waiting("reading"):
+        assert started.wait(timeout=60)
+
+
+def test_a_short_wait_is_not(started, monkeypatch):
+    monkeypatch.setattr(console, "PATIENCE", 1e6)
+    threads = threading.active_count()
+    with console.waiting("reading"):
+        assert threading.active_count() == threads + 1
+    assert not started.is_set()
+    assert threading.active_count() == threads
+
+
+def test_without_a_terminal_nothing_is_explained(started, monkeypatch):
+    monkeypatch.setattr(console, "PATIENCE", 0.0)
+    monkeypatch.setattr(console.Output, "is_terminal", property(lambda self: False))
+    threads = threading.active_count()
+    with console.waiting("reading"):
+        assert threading.active_count() == threads
+    assert not started.is_set()
+
+
+# -------------------------------------------------------------------------------------------------- real recordings
+
+
+def test_a_hand_over_is_learned_and_followed(shared_data, tmp_path, monkeypatch, run):
+    """The commands of the README, on recordings of people."""
+    monkeypatch.chdir(tmp_path)
+    data = shared_data / "handover"
+    code, out, _ = run("fit", data, "--observed", "taker_?", "--controlled", "giver_?", "-o", "handover.inphase")
+    assert code == 0
+    assert "3 observed and 3 controlled channels, 72 demonstrations" in out
+    assert run("inspect", "handover.inphase")[0] == 0
+    code, out, _ = run("replay", "handover.inphase", data / "episode_001.csv", "--json")
+    assert code == 0
+    (found,) = json.loads(out)
+    assert found["nmse"] < 1
+    assert 0.3 < found["coverage"] <= 1
+    assert found["final_pose_50"] < 0.5
+
+
+@pytest.mark.parametrize("folder", ["handover", "nuisi/*/*.csv", "yumi/*/*.csv"])
+def test_nothing_in_the_recordings_is_worse_than_a_warning(folder, shared_data, run):
+    code, out, err = run("validate", shared_data / folder)
+    assert (code, err) == (0, "")
+    assert "cannot be used" not in out
+    assert "findings" in out or "nothing found" in out
