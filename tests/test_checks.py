@@ -83,7 +83,9 @@ def test_jitter_of_the_clock_is_no_fault(rng: np.random.Generator) -> None:
 
 def test_a_fast_movement_that_announces_itself_is_no_jump() -> None:
     times, values = clean()
-    values[:, HAND_X] = np.interp(np.arange(len(times)), range(60, 67), [0, 0.02, 0.1, 0.33, 0.75, 0.95, 1])
+    values[:, HAND_X] = values[:, HAND_Y] * 0.01 + np.interp(
+        np.arange(len(times)), range(60, 67), [0, 0.02, 0.1, 0.33, 0.75, 0.95, 1]
+    )
     assert found(times, values) == []
 
 

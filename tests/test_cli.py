@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 import threading
@@ -56,9 +57,9 @@ def edit(path: Path, change: Callable[[list[str]], list[str]]) -> None:
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder to work in, with good recordings, a model of them, and no terminal that is as wide as mine."""
-    write(tmp_path / "good")
-    inphase.fit(inphase.load(tmp_path / "good", "hand_?", "robot_?")).save(tmp_path / "good.inphase")
     monkeypatch.chdir(tmp_path)
+    write(tmp_path / "good")
+    inphase.fit(inphase.load("good", "hand_?", "robot_?")).save("good.inphase")
     monkeypatch.delenv("COLUMNS", raising=False)
     return tmp_path
 
@@ -258,9 +259,7 @@ def test_a_disk_that_is_full_is_told_in_one_line(here, run, monkeypatch):
     assert tree(here) == before
 
 
-@pytest.mark.parametrize(
-    "at", ["inphase.cli.fit.fit_model", "inphase.cli.reading.load", "pathlib.Path.write_bytes"]
-)
+@pytest.mark.parametrize("at", ["inphase.cli.fit.fit_model", "inphase.cli.reading.load", "pathlib.Path.write_bytes"])
 def test_an_interrupt_leaves_nothing(at, here, run, monkeypatch):
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
@@ -461,7 +460,7 @@ def test_validate_names_episode_channel_and_time_and_rejects_nothing(here, run):
     assert "'robot_y'" in found[("episode_5", None, "unreadable")]["message"]
     assert {episode for episode, _, _ in found} == {"episode_1", "episode_3", "episode_4", "episode_5"}
     table = run("validate", "faulty")[1]
-    (row,) = [line.split() for line in table.splitlines() if " jump " in line]
+    (row,) = [line.split() for line in table.splitlines() if " jump  " in line]
     assert row[:4] == ["episode_1", "hand_y", f"{times[30]:.3f}", "jump"]
     assert "6 episodes, 4 channels: 4 with findings" in table
     assert tree(here) == before
@@ -500,10 +499,6 @@ SHOWN = [
     ["replay", "good.inphase", "good"],
     ["replay", "good.inphase", "odd/an_episode_with_a_rather_long_name.csv"],
     ["validate", "odd"],
-    ["demo", "--help"],
-    ["fit", "--help"],
-    ["replay", "--help"],
-    ["validate", "--help"],
 ]
 
 
@@ -523,12 +518,12 @@ def test_eighty_columns_are_enough(command, shown, run, monkeypatch):
     out = run(*command)[1]
     assert out
     assert [line for line in out.splitlines() if len(line) > 80] == []
-    assert "…" not in out.replace("odd/…", "").replace("…rather", "").replace("…ather_long_name", "")
+    assert re.findall(r"\S+\w…", out) == []  # no cell is cut
 
 
 def test_in_a_pipe_a_finding_stays_on_its_line(shown, run):
     out = run("validate", "odd")[1]
-    (row,) = [line for line in out.splitlines() if " jump " in line]
+    (row,) = [line for line in out.splitlines() if " jump  " in line]
     assert row.split()[0] == "an_episode_with_a_rather_long_name"
     assert "all of its movement spans" in row
 

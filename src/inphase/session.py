@@ -13,13 +13,13 @@ from inphase.channels import match
 from inphase.errors import ObservationError, OptionError, listing
 from inphase.filters import Belief, Course, StepInfo, make
 from inphase.model import Model
-from inphase.observation import Observation
+from inphase.observation import NOTHING, Observation
 from inphase.result import Estimate, Response, Status
 
 BLIND_AFTER = 0.1  # of a typical interaction with nothing seen, and the estimate is called blind
 UNLIKE_ABOVE = 9.0  # surprise a reading, averaged: as if every reading lay three standard deviations off
 UNLIKE_WITHIN = 0.05  # of a typical interaction, the time constant of that average
-FINISHED_AT = 0.999
+FINISHED_WITHIN = (0.01, 0.05)  # of phase: what is left at the end is no more than the doubt about it, in these bounds
 SLOWEST = 0.05  # of the typical tempo: a response to a partner who stands still must end some time
 
 
@@ -74,11 +74,12 @@ class Session:
         dt = 0.0 if self._time is None else time - self._time
         observation = self._observation(sample, time, dt)
         belief, info = self._filter.step(self._belief, observation, dt, self._rng)
+        used = observation if info.healthy else NOTHING
         self._belief, self._time = belief, time
-        self._last_seen[observation.features] = time
-        if self._last_sight is None or len(observation):
+        self._last_seen[used.features] = time
+        if self._last_sight is None or len(used):
             self._last_sight = time
-        return self._estimate(observation, info, dt)
+        return self._estimate(used, info, dt)
 
     def respond(
         self,
@@ -122,10 +123,10 @@ class Session:
             for name, value in values.items():
                 if name not in self._index:
                     raise ObservationError(f"unknown channel {name!r}; the channels are {listing(self._index)}")
-                sample[self._index[name]] = value
+                sample[self._index[name]] = _numbers(value, [name])
         else:
             observed = self.model.observed
-            array = np.asarray(values, dtype=np.float64)
+            array = _numbers(values, observed)
             if array.shape != (len(observed),):
                 raise ObservationError(
                     f"expected {len(observed)} values, one for each of {listing(observed)}, got shape {array.shape}"
@@ -175,7 +176,7 @@ class Session:
         model, belief = self.model, self._belief
         phase, var = float(belief.phase_mean[0]), float(belief.phase_cov[0, 0])
         velocity, velocity_std = self._velocity()
-        if len(observation) and info.healthy:
+        if len(observation):
             keep = np.exp(-dt / (UNLIKE_WITHIN * self._typical_duration))
             self._surprise = keep * self._surprise + (1 - keep) * info.surprise / len(observation)
         span = model.scaling.span[observation.features]
@@ -197,4 +198,12 @@ class Session:
             return Status.BLIND if unseen > BLIND_AFTER * self._typical_duration else Status.NOTHING_SEEN
         if self._surprise > UNLIKE_ABOVE:
             return Status.UNLIKE
-        return Status.FINISHED if not self.model.phase.periodic and phase >= FINISHED_AT else Status.FOLLOWING
+        left = 1.0 - float(np.clip(np.sqrt(self._belief.phase_cov[0, 0]), *FINISHED_WITHIN))
+        return Status.FINISHED if not self.model.phase.periodic and phase >= left else Status.FOLLOWING
+
+
+def _numbers(values: object, names: Sequence[str]) -> Float[np.ndarray, "..."]:
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ObservationError(f"expected numbers for {listing(names)}, got {values!r}") from None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -11,7 +12,7 @@ from inphase.evaluation.replay import MARKS, Replay, by_the_clock
 from inphase.model import Model
 from inphase.trajectory import Demonstration
 
-Figures = Mapping[str, float | None]
+Figures = Mapping[str, Any]  # float or None, and what else is told of a replay
 
 FINAL = tuple(f"final_pose_{100 * mark:.0f}" for mark in MARKS)
 LONGEST = 19  # characters of a name: the table fits 80 columns

@@ -81,8 +81,8 @@ def _read(paths: Sequence[Path], columns: Columns) -> tuple[list[tuple[str, Tabl
 def _print(findings: Sequence[Finding], episodes: int, channels: int) -> None:
     console = Output()
     table = PrintedTable(box=None, pad_edge=False)
-    table.add_column("episode", overflow="fold", max_width=24)
-    table.add_column("channel", overflow="fold", max_width=20)
+    for title in ("episode", "channel"):  # where there is little room, the message needs it most
+        table.add_column(title, overflow="fold", max_width=20 if console.width < 120 else None)
     table.add_column("at [s]", justify="right", no_wrap=True)
     table.add_column("finding", no_wrap=True)
     table.add_column()

@@ -94,7 +94,7 @@ def _rows(path: str | Path, text: str, delimiter: str) -> tuple[list[int], list[
 
 
 def _header(path: str | Path, cells: Sequence[str], time: str, delimiter: str) -> list[str]:
-    names = [" ".join(cell.split()) for cell in cells]  # on one line, so that messages are
+    names = [" ".join(cell.splitlines()).strip() for cell in cells]  # on one line, so that messages are
     names[0] = names[0].lstrip("# ")  # numpy.savetxt comments its header out
     if all(_is_number(name) for name in names):
         raise DataError(f"{path}: expected a header line of names, got {listing(names, 4)}")
