@@ -32,7 +32,7 @@ ROLES = ["--observed", "hand_?", "--controlled", "robot_?"]
 # --------------------------------------------------------------------------------------------------------- recordings
 
 
-def episode(seed: int, samples: int = 60) -> tuple[np.ndarray, np.ndarray]:
+def episode(seed: int, samples: int = 30) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and values of one interaction in a style of its own."""
     rng = np.random.default_rng(seed)
     times = np.linspace(0, 2 + 0.1 * rng.standard_normal(), samples)
@@ -301,7 +301,7 @@ def test_columns_are_separated_as_told(here, run):
         path.write_text(path.read_text().replace(",", "\t").replace("time", "clock"))
     for delimiter in ("tab", "\\t", "\t"):
         assert run("fit", "good", *FIT, "--time", "clock", "--delimiter", delimiter)[0] == 0
-    assert run("replay", "new.inphase", "good", "--time", "clock", "--delimiter", "tab")[0] == 0
+    assert run("replay", "new.inphase", "good/episode_1.csv", "--time", "clock", "--delimiter", "tab")[0] == 0
     assert run("validate", "good", "--time", "clock", "--delimiter", "tab")[0] == 0
 
 
@@ -326,9 +326,9 @@ def test_the_card_of_recordings_holds_their_figures(here, run):
     times, _ = episode(2)
     assert card["episodes"][2] == {
         "name": "episode_2",
-        "samples": 60,
+        "samples": 30,
         "duration": pytest.approx(times[-1]),
-        "rate": pytest.approx(59 / times[-1]),
+        "rate": pytest.approx(29 / times[-1]),
     }
     everything = np.concatenate([episode(i)[1] for i in range(4)])
     assert [c["low"] for c in card["channels"]] == everything.min(axis=0).tolist()
@@ -339,7 +339,7 @@ def test_the_card_of_recordings_holds_their_figures(here, run):
 def test_a_channel_that_was_never_seen_is_shown_as_such(here, run):
     for i in range(4):
         times, values = episode(i)
-        write_csv(Path(f"good/episode_{i}.csv"), NAMES, times, np.column_stack([values[:, :3], np.full(60, np.nan)]))
+        write_csv(Path(f"good/episode_{i}.csv"), NAMES, times, np.column_stack([values[:, :3], np.full(30, np.nan)]))
     assert json.loads(run("inspect", "good", "--json")[1])["channels"][3]["low"] is None
     row = next(line for line in run("inspect", "good")[1].splitlines() if line.startswith("robot_y"))
     assert "100.0 %" in row
@@ -377,7 +377,7 @@ def test_replay_says_what_the_library_says(here, run):
 
 def test_replay_prints_as_it_goes_and_what_came_of_it(here, run):
     out = run("replay", "good.inphase", "good/episode_1.csv", "--seed", 3)[1].splitlines()
-    assert out[0].startswith("episode_1: 60 samples")
+    assert out[0].startswith("episode_1: 30 samples")
     assert out[1].split() == ["time", "[s]", "phase", "pace", "error", "inside", "status"]
     rows = [line.split() for line in out[2:12]]
     assert len(rows) == 10
@@ -392,16 +392,17 @@ def test_replay_prints_as_it_goes_and_what_came_of_it(here, run):
 
 
 def test_replay_of_many_is_a_row_each_and_their_mean(here, run):
-    out = run("replay", "good.inphase", "good", "--filter", "bip")[1]
-    results = json.loads(run("replay", "good.inphase", "good", "--filter", "bip", "--json")[1])
-    assert [found["episode"] for found in results] == [f"episode_{i}" for i in range(4)]
+    arguments = ["replay", "good.inphase", "good/episode_2.csv", "good/episode_[01].csv", "--filter", "bip"]
+    out = run(*arguments)[1]
+    results = json.loads(run(*arguments, "--json")[1])
+    assert [found["episode"] for found in results] == ["episode_2", "episode_0", "episode_1"]
     assert "time [s]" not in out
     (mean,) = [line.split() for line in out.splitlines() if line.startswith("mean ")]
     assert float(mean[1]) == pytest.approx(np.mean([found["nmse"] for found in results]), abs=6e-4)
 
 
 def test_trouble_is_named_in_the_table_and_told_below(here, run):
-    times, values = episode(1)
+    times, values = episode(1, samples=60)
     values[20:40, :2] = np.nan
     values[45:, :2] += 3.0
     write_csv(Path("odd.csv"), NAMES, times, values)
@@ -443,7 +444,7 @@ def test_names_are_shown_as_they_are(here, run):
 def test_validate_names_episode_channel_and_time_and_rejects_nothing(here, run):
     write(here / "faulty", count=6)
     times, values = episode(1)
-    values[30, 1] += 4.0
+    values[15, 1] += 4.0
     write_csv(Path("faulty/episode_1.csv"), NAMES, times, values)
     edit(here / "faulty" / "episode_3.csv", lambda lines: [*lines[:20], lines[19], *lines[20:]])
     (here / "faulty" / "episode_4.csv").write_text("time;hand_x\n")
@@ -452,7 +453,7 @@ def test_validate_names_episode_channel_and_time_and_rejects_nothing(here, run):
     code, out, err = run("validate", "faulty", "--json")
     assert (code, err) == (1, "")
     found = {(f["episode"], f["channel"], f["kind"]): f for f in json.loads(out)}
-    assert found[("episode_1", "hand_y", "jump")]["time"] == pytest.approx(times[30])
+    assert found[("episode_1", "hand_y", "jump")]["time"] == pytest.approx(times[15])
     assert found[("episode_1", "hand_y", "jump")]["severity"] == "warning"
     assert found[("episode_3", None, "backwards")]["severity"] == "error"
     assert found[("episode_3", None, "backwards")]["time"] == pytest.approx(episode(3)[0][18], abs=1e-3)
@@ -461,7 +462,7 @@ def test_validate_names_episode_channel_and_time_and_rejects_nothing(here, run):
     assert {episode for episode, _, _ in found} == {"episode_1", "episode_3", "episode_4", "episode_5"}
     table = run("validate", "faulty")[1]
     (row,) = [line.split() for line in table.splitlines() if " jump  " in line]
-    assert row[:4] == ["episode_1", "hand_y", f"{times[30]:.3f}", "jump"]
+    assert row[:4] == ["episode_1", "hand_y", f"{times[15]:.3f}", "jump"]
     assert "6 episodes, 4 channels: 4 with findings" in table
     assert tree(here) == before
 
@@ -496,7 +497,7 @@ SHOWN = [
     ["inspect", "good.inphase"],
     ["inspect", "long"],
     ["replay", "good.inphase", "good/episode_1.csv"],
-    ["replay", "good.inphase", "good"],
+    ["replay", "good.inphase", "good", "--filter", "bip"],
     ["replay", "good.inphase", "odd/an_episode_with_a_rather_long_name.csv"],
     ["validate", "odd"],
 ]
@@ -507,7 +508,7 @@ def shown(here: Path) -> None:
     write(here / "long", names=("left_shoulder_x", "left_shoulder_y", "robot_gripper_opening", "robot_joint_7"))
     (here / "odd").mkdir()
     times, values = episode(1)
-    values[30, 1] += 4.0
+    values[15, 1] += 4.0
     values[10:14, 0] = np.nan
     write_csv(here / "odd" / "an_episode_with_a_rather_long_name.csv", NAMES, times, values)
 

@@ -19,7 +19,7 @@ from inphase.result import Estimate, Response, Status
 BLIND_AFTER = 0.1  # of a typical interaction with nothing seen, and the estimate is called blind
 UNLIKE_ABOVE = 9.0  # surprise a reading, averaged: as if every reading lay three standard deviations off
 UNLIKE_WITHIN = 0.05  # of a typical interaction, the time constant of that average
-FINISHED_WITHIN = (0.01, 0.05)  # of phase: what is left at the end is no more than the doubt about it, in these bounds
+FINISHED_AT, AGAIN_BELOW = 0.99, 0.95  # phases where the end is told and taken back: no flicker in between
 SLOWEST = 0.05  # of the typical tempo: a response to a partner who stands still must end some time
 
 
@@ -47,6 +47,7 @@ class Session:
         self._last_seen = np.full(self.model.coordinates.count, -np.inf)
         self._last_sight: float | None = None
         self._surprise = 1.0
+        self._finished = False
 
     @property
     def belief(self) -> Belief:
@@ -198,11 +199,11 @@ class Session:
             return Status.BLIND if unseen > BLIND_AFTER * self._typical_duration else Status.NOTHING_SEEN
         if self._surprise > UNLIKE_ABOVE:
             return Status.UNLIKE
-        left = 1.0 - float(np.clip(np.sqrt(self._belief.phase_cov[0, 0]), *FINISHED_WITHIN))
-        return Status.FINISHED if not self.model.phase.periodic and phase >= left else Status.FOLLOWING
+        self._finished = phase >= (AGAIN_BELOW if self._finished else FINISHED_AT) and not self.model.phase.periodic
+        return Status.FINISHED if self._finished else Status.FOLLOWING
 
 
-def _numbers(values: object, names: Sequence[str]) -> Float[np.ndarray, "..."]:
+def _numbers(values: object, names: Sequence[str]) -> Float[np.ndarray, ...]:
     try:
         return np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
