@@ -190,10 +190,18 @@ BAD = [
     (nothing, ["fit", "good", *ROLES, "-o", "no/a.inphase"], ["no/a.inphase: expected the folder no to exist"]),
     (nothing, ["fit", "good", *ROLES, "-o", "good"], ["good: expected a file name, got a folder"]),
     (nothing, ["fit", "good", *FIT, "--basis", "wavelet:9"], ["'wavelet'", "gaussian, sigmoid, polynomial, periodic"]),
-    (nothing, ["fit", "good", *FIT, "--basis", "gaussian"], ["--basis: expected family:size", "got 'gaussian'"]),
-    (nothing, ["fit", "good", *FIT, "--basis", "gaussian:many"], ["--basis: expected family:size", "'gaussian:many'"]),
-    (nothing, ["fit", "good", *FIT, "--basis", "gaussian:9:1:1"], ["--basis: expected family:size"]),
-    (nothing, ["fit", "good", *FIT, "--basis", "polynomial:5:0.1"], ["polynomial", "arguments are degree"]),
+    (
+        nothing,
+        ["fit", "good", *FIT, "--basis", "gaussian"],
+        ["--basis: expected gaussian:size[:width]", "got 'gaussian'"],
+    ),
+    (
+        nothing,
+        ["fit", "good", *FIT, "--basis", "gaussian:many"],
+        ["--basis: expected gaussian:size", "'gaussian:many'"],
+    ),
+    (nothing, ["fit", "good", *FIT, "--basis", "sigmoid:9:1:1"], ["--basis: expected sigmoid:size[:width], got"]),
+    (nothing, ["fit", "good", *FIT, "--basis", "polynomial:5:0.1"], ["--basis: expected polynomial:degree, got"]),
     (nothing, ["fit", "good", *FIT, "--basis", "gaussian:9", "--periodic"], ["both periodic or both not"]),
     (nothing, ["fit", "good", *FIT, "--order", "3"], ["order 0, 1 or 2, got 3"]),
     (nothing, ["fit", "good", "--observed", "paw_?", "--controlled", "robot_?"], ["no channel fits 'paw_?'", "hand_x"]),
@@ -346,7 +354,8 @@ def test_a_channel_that_was_never_seen_is_shown_as_such(here, run):
 
 
 @pytest.mark.parametrize(
-    "basis", [Gaussian(9), Gaussian(9, 0.25), Sigmoid(5), Polynomial(4), Periodic(7), Periodic(6, 0.2)]
+    "basis",
+    [Gaussian(9), Gaussian(9, 0.25), Gaussian(9, 0.25, 0.5), Sigmoid(5), Polynomial(4), Periodic(7), Periodic(6, 0.2)],
 )
 def test_a_basis_is_read_as_it_is_shown(basis):
     assert parse_basis(show_basis(basis)) == basis

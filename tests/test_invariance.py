@@ -233,12 +233,12 @@ KINDS = {"heading": "angle", "wrist": "angle"}  # the quaternion is found by its
 
 
 def rotation(rng: np.random.Generator, rate: float = RATE) -> tuple[np.ndarray, np.ndarray]:
-    """A hand that turns by more than half a turn, through ±π, its palm about a slanted axis, and a robot beside it."""
+    """A hand that turns more than all the way round, its palm nearly so about a slanted axis, and a robot beside it."""
     times = np.arange(round(2 * rate) + 1) / rate
     phases, far = times / times[-1], 1 + 0.1 * rng.standard_normal()
     smooth = phases**3 * (10 - 15 * phases + 6 * phases**2)
-    heading = 2.0 + 3.5 * far * smooth
-    palm = Rotation.from_rotvec(np.outer(2.5 * far * np.sin(0.5 * np.pi * phases), [0.6, 0.0, 0.8])).as_quat()
+    heading = 2.0 + 7.0 * far * smooth
+    palm = Rotation.from_rotvec(np.outer(4.5 * far * np.sin(0.5 * np.pi * phases), [0.6, 0.0, 0.8])).as_quat()
     grip, wrist = far * np.sin(np.pi * phases), 3.0 - 2.0 * far * smooth
     values = np.column_stack([heading, palm, grip, wrist]) + 0.01 * rng.standard_normal((len(times), 7))
     values[:, 1:5] /= np.linalg.norm(values[:, 1:5], axis=1, keepdims=True)
@@ -302,3 +302,16 @@ def test_a_hand_that_turns_is_followed(name: str, turns: list, rng: np.random.Ge
     nearest = values[np.abs(times / times[-1] - response.phases[:, None]).argmin(1), 1:5]
     off = (Rotation.from_quat(palm).inv() * Rotation.from_quat(nearest)).magnitude()
     assert off.max() < 0.25
+
+
+@NAMES
+def test_half_a_quaternion_and_an_infinite_angle_were_not_seen(
+    name: str, turns: list, rng: np.random.Generator
+) -> None:
+    model, (times, values) = inphase.fit(turning(turns)), rotation(rng)
+    blind, odd = values[:12, :5].copy(), values[:12, :5].copy()
+    blind[4], blind[7, 1:5] = np.nan, np.nan
+    odd[4], odd[7, 3] = [np.inf, 0.1, np.inf, 0.1, 0.1], np.nan
+    (_, estimates, scores), (_, others, other_scores) = (follow(model, times[:12], list(v), name) for v in (blind, odd))
+    np.testing.assert_array_equal(others, estimates)
+    np.testing.assert_array_equal(other_scores, scores)

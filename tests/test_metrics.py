@@ -142,8 +142,10 @@ def test_quaternions_are_compared_up_to_their_sign(rng):
     mean, truth = (np.column_stack([np.zeros(200), q]) for q in (one, other))
     plain = difference(QUATERNION, mean, truth)
     signs = rng.choice([-1.0, 1.0], 200)
-    turned = difference(QUATERNION, mean, truth * np.column_stack([np.ones(200), *[signs] * 4]))
-    assert_allclose(turned, plain, atol=1e-15)
+    flipped = truth * np.column_stack([np.ones(200), *[signs] * 4])
+    before = flipped.copy()
+    assert_allclose(difference(QUATERNION, mean, flipped), plain, atol=1e-15)
+    assert_array_equal(flipped, before)
     # The chord between the nearer of q and -q: 2 sin of a quarter of the angle between the rotations.
     angle = (Rotation.from_quat(one).inv() * Rotation.from_quat(other)).magnitude()
     assert_allclose(np.linalg.norm(plain[:, 1:], axis=1), 2 * np.sin(angle / 4), atol=1e-12)

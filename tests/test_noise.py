@@ -173,19 +173,17 @@ def test_what_is_held_out_is_explained_by_the_others_as_a_filter_would(rng: np.r
     weights = rng.normal(size=(6, layout.size)) + 5.0
     phases = (np.arange(grid) + 0.5) / grid
     functions = np.stack([layout.predict(phases, unit).ravel() for unit in np.eye(layout.size)], axis=1)  # (P F, B)
-    var = np.stack([layout.predict(phases, w) for w in weights]).var(0).mean(0)
-    for _ in range(3):
-        left = []
-        for i, own in enumerate(weights):
-            others = np.delete(weights, i, axis=0)
-            mean, cov = others.mean(0), np.cov(others, rowvar=False)
-            seen = np.tile(shown > 0, grid)  # Bayesian linear regression, in the space of the weights
-            design, noise = functions[seen], np.tile(var, grid)[seen] * grid
-            gain = cov @ design.T @ np.linalg.inv(design @ cov @ design.T + np.diag(noise))
-            left.append((functions @ (own - mean - gain @ design @ (own - mean))).reshape(grid, 3))
-        var = np.mean(np.square(left), axis=(0, 1))
     held_out = held_out_noise(layout, weights, shown, duration=2.0)
-    np.testing.assert_allclose(held_out.var, var, rtol=1e-8)
+    left = []
+    for i, own in enumerate(weights):
+        others = np.delete(weights, i, axis=0)
+        mean, cov = others.mean(0), np.cov(others, rowvar=False)
+        seen = np.tile(shown > 0, grid)  # Bayesian linear regression, in the space of the weights
+        design, noise = functions[seen], np.tile(held_out.var, grid)[seen] * grid
+        gain = cov @ design.T @ np.linalg.inv(design @ cov @ design.T + np.diag(noise))
+        left.append((functions @ (own - mean - gain @ design @ (own - mean))).reshape(grid, 3))
+    # The variance that this regression takes for the noise is the one it leaves: searched for until it moves by 1 %.
+    np.testing.assert_allclose(held_out.var, np.mean(np.square(left), axis=(0, 1)), rtol=0.02)
     longer = held_out_noise(layout, weights, shown, duration=6.0)
     np.testing.assert_array_equal(longer.var, held_out.var)
     np.testing.assert_allclose(longer.correlation_time, 3 * held_out.correlation_time)

@@ -36,13 +36,13 @@ class Gaussian:
 
     def __post_init__(self) -> None:
         size = whole("Gaussian size", self.size, least=2)
-        margin = min(1.0, size / 2 - 1) if self.margin is None else float(self.margin)
-        if not 0 <= margin < (size - 1) / 2:
+        margin: object = min(1.0, size / 2 - 1) if self.margin is None else self.margin
+        if isinstance(margin, bool) or not isinstance(margin, (int, float)) or not 0 <= margin < (size - 1) / 2:
             raise OptionError(f"Gaussian margin: expected 0 <= margin < {(size - 1) / 2:g}, got {self.margin!r}")
         distance = 1 / (size - 1 - 2 * margin)
         width = positive("Gaussian width", self.width, default=distance)
         centres = frozen((np.arange(size) - margin) * distance)
-        settle(self, size=size, width=width, margin=margin, _centres=centres, _scale=1 / width)
+        settle(self, size=size, width=width, margin=float(margin), _centres=centres, _scale=1 / width)
 
     def __call__(self, phases: Float[np.ndarray, "*P"]) -> Float[np.ndarray, "*P B"]:
         distance = (clipped(phases)[0] - self._centres) * self._scale

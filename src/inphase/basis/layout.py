@@ -106,6 +106,18 @@ class Layout:
             rows.shape[:1],
         )
 
+    def project_each(
+        self,
+        phases: Float[np.ndarray, " P"],
+        rows: Float[np.ndarray, "N B"],
+        features: Int[np.ndarray, " M"] | None = None,
+    ) -> Float[np.ndarray, "P N M"]:
+        """(P, N, M) rows @ H_wᵀ at every phase: `project` for many phases at once."""
+        plan = self._plan(features, rows)
+        parts = [block.basis(phases) @ block.weights(rows).reshape(-1, block.basis.size).T for block in plan.blocks]
+        shape = (len(phases), len(rows))
+        return plan.join([p.reshape(*shape, b.count) for p, b in zip(parts, plan.blocks, strict=True)], shape)
+
     def lift(
         self, phase: float, columns: Float[np.ndarray, "M K"], features: Int[np.ndarray, " M"] | None = None
     ) -> Float[np.ndarray, "B K"]:

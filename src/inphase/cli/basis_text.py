@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-from inphase import basis as families
-from inphase.basis import FAMILIES, Basis
-from inphase.errors import OptionError
+import inspect
+
+from inphase.basis import FAMILIES, Basis, make
+from inphase.errors import OptionError, listing
 
 
 def parse_basis(text: str) -> Basis:
-    """The basis of `family:size` or `family:size:width`, of a polynomial `polynomial:degree`; raises OptionError."""
+    """The basis of a family's name and its arguments, the first one or more, between colons; raises OptionError."""
     family, *numbers = text.split(":")
-    names = ("degree" if family == "polynomial" else "size", "width")
+    if family not in FAMILIES:
+        raise OptionError(f"--basis: unknown family of basis functions {family!r}; one of {listing(FAMILIES)}")
+    names = list(inspect.signature(FAMILIES[family]).parameters)
     try:
         values = [int(numbers[0]), *map(float, numbers[1:])]
         parameters = dict(zip(names[: len(values)], values, strict=True))
     except (IndexError, ValueError):
-        raise OptionError(f"--basis: expected family:size or family:size:width, got {text!r}") from None
-    return families.make(family, **parameters)
+        form = f"{family}:{names[0]}" + "".join(f"[:{name}]" for name in names[1:])
+        raise OptionError(f"--basis: expected {form}, got {text!r}") from None
+    return make(family, **parameters)
 
 
 def show_basis(basis: Basis) -> str:
-    """The shortest such text of a basis: without a width that is the usual one."""
+    """The shortest such text of a basis: without the arguments that are the usual ones."""
     family = next(name for name, kind in FAMILIES.items() if isinstance(basis, kind))
-    size, *width = basis.parameters().values()
-    short = f"{family}:{size}"
-    return short if parse_basis(short) == basis else f"{short}:{width[0]:.3g}"
+    named = list(basis.parameters().items())
+    while len(named) > 1 and make(family, **dict(named[:-1])) == basis:
+        named.pop()
+    return ":".join([family, *(f"{value:.3g}" for _, value in named)])

@@ -41,7 +41,7 @@ def demo(
     picture = output / "demo.png"
     _check(output, picture, shapes, filter)
     console = Output()
-    console.print("Real handwriting: the pen's x is the partner that is seen, its y the robot that answers.\n")
+    console.print("Handwriting: the pen's x is the partner who is seen, its y the robot's answer.\n")
     table, results, panels = ScoreTable(console, shapes), [], []
     for shape in shapes:
         export_handwriting(shape, output / shape)
@@ -86,6 +86,6 @@ def _check(output: Path, picture: Path, shapes: tuple[str, ...], filter: str) ->
 def _program() -> str:
     """How this program was called, so that a line can be pasted: it need not be on the path, as under `make demo`."""
     called = sys.argv[0]
-    if Path(called).name == "__main__.py":
+    if Path(called) == Path(__file__).with_name("__main__.py"):
         return f"{shlex.quote(sys.executable)} -m inphase.cli"
     return shlex.quote(called) if Path(called).stem == "inphase" and shutil.which("inphase") != called else "inphase"

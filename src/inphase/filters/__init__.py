@@ -10,9 +10,10 @@ from inphase.filters.belief import Belief, Course, EnsembleBelief, GaussianBelie
 from inphase.filters.bip import Bip
 from inphase.filters.ebip import Ebip
 from inphase.filters.filter import Filter, StepInfo
+from inphase.filters.rbpf import ParticleBelief, Rbpf
 from inphase.model import Model
 
-FILTERS: dict[str, type[Bip] | type[Ebip]] = {"bip": Bip, "ebip": Ebip}
+FILTERS: dict[str, type[Bip] | type[Ebip] | type[Rbpf]] = {"bip": Bip, "ebip": Ebip, "rbpf": Rbpf}
 
 __all__ = [
     "FILTERS",
@@ -23,6 +24,8 @@ __all__ = [
     "EnsembleBelief",
     "Filter",
     "GaussianBelief",
+    "ParticleBelief",
+    "Rbpf",
     "StepInfo",
     "make",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -69,7 +69,7 @@ def fit(
         prior=prior if prior is not None else WeightPrior(weights),
         noise=noise,
         phase=phase,
-        spread=_spread(dataset),
+        spread=_spread(coordinates, features),
         provenance={**dataset.provenance, "demonstrations": str(len(dataset))},
     )
 
@@ -97,10 +97,11 @@ def _check(dataset: Dataset) -> None:
             )
 
 
-def _spread(dataset: Dataset) -> Float[np.ndarray, " D"]:
-    """The standard deviation of every channel over the demonstrations; the four of a quaternion share theirs."""
-    over_all = np.nanstd(np.concatenate([demonstration.values for demonstration in dataset]), axis=0)
-    for part in quaternions(dataset.channels):
+def _spread(coordinates: Coordinates, features: Sequence[Float[np.ndarray, "_ F"]]) -> Float[np.ndarray, " D"]:
+    """The standard deviation of every channel, on one branch of its circle; the four of a quaternion share theirs."""
+    channels = [coordinates.to_channels(curve, np.zeros_like(curve))[0] for curve in features]
+    over_all = np.nanstd(np.concatenate(channels), axis=0)
+    for part in quaternions(coordinates.channels):
         over_all[list(part)] = np.sqrt(np.mean(over_all[list(part)] ** 2))
     return np.asarray(over_all)
 

@@ -1,0 +1,216 @@
+"""Rao-Blackwellised filter: particles over the phase, each with an exact Kalman filter over the weights.
+
+Given the path of the phase, the weights are linear and Gaussian (Eq. 2.7 to 2.10 without the phase columns of H). So
+only phase and tempo are sampled (DESIGN 4, trap 8), and what makes an extended Kalman filter fail, a phase that is uncertain while the
+movement is curved, is not linearised at all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from inphase.errors import OptionError
+from inphase.filters.belief import Course
+from inphase.filters.filter import StepInfo
+from inphase.filters.tempo import Motion, advance, begin
+from inphase.model import Model
+from inphase.observation import Observation
+
+VARIANCE_KEPT = 0.999  # by the directions that are filtered; the rest is added to the noise
+MOST_DIRECTIONS = 24  # for the time a step takes
+RESAMPLE_BELOW = 0.5  # of the particles, their effective number
+PHASES = 100  # at which the rest of the variance is tabulated
+LOOKED_AT = 2000  # phases in a response, particles times samples; fewer particles speak for all when there are more
+
+
+@dataclass(frozen=True)
+class Directions:
+    """The few directions of the prior in which weights are filtered, and what they leave of its variance.
+
+    rows: (R, B), w = mean + c @ rows. rest: (PHASES, F) variance by phase.
+    """
+
+    rows: Float[np.ndarray, "R B"]
+    rest: Float[np.ndarray, "_ F"]
+
+    def rest_at(self, phases: Float[np.ndarray, " P"], features: Int[np.ndarray, " M"]) -> Float[np.ndarray, "P M"]:
+        """(P, M) the variance that is left over at each phase."""
+        nearest = ((phases % 1.0 if phases.max() > 1 or phases.min() < 0 else phases) * (len(self.rest) - 1)).round()
+        return np.asarray(self.rest[nearest.astype(np.int64)][:, features])
+
+
+@dataclass(frozen=True)
+class ParticleBelief:
+    """Particles of phase and tempo, each with a Gaussian over the weights in the filter's directions.
+
+    log_weights: (P,). means: (P, R), covs: (P, R, R).
+    """
+
+    model: Model
+    directions: Directions
+    log_weights: Float[np.ndarray, " P"]
+    motion: Motion
+    means: Float[np.ndarray, "P R"]
+    covs: Float[np.ndarray, "P R R"]
+
+    def __post_init__(self) -> None:
+        for array in (self.log_weights, self.means, self.covs):
+            array.setflags(write=False)
+
+    @cached_property
+    def weights(self) -> Float[np.ndarray, " P"]:
+        """(P,) the probability of each particle."""
+        weights = np.exp(self.log_weights - self.log_weights.max())
+        return np.asarray(weights / weights.sum())
+
+    @cached_property
+    def _moving(self) -> Float[np.ndarray, "P K"]:
+        return np.stack([self.motion.phase, self.motion.tempo(self.model.phase)], axis=1)
+
+    @property
+    def phase_mean(self) -> Float[np.ndarray, " K"]:
+        return np.asarray(self.weights @ self._moving)
+
+    @property
+    def phase_cov(self) -> Float[np.ndarray, "K K"]:
+        off = self._moving - self.phase_mean
+        return np.asarray((off * self.weights[:, None]).T @ off)
+
+    @property
+    def weights_mean(self) -> Float[np.ndarray, " B"]:
+        return np.asarray(self.model.prior.mean + self.weights @ self.means @ self.directions.rows)
+
+    def trajectory(
+        self, course: Course, features: Int[np.ndarray, " M"]
+    ) -> tuple[Float[np.ndarray, "S M"], Float[np.ndarray, "S M"]]:
+        most = max(LOOKED_AT // len(course.share), 20)
+        speaking = np.arange(len(self.weights))
+        weights = self.weights
+        if len(weights) > most:
+            speaking = _systematic(weights, most, 0.5)
+            weights = np.full(most, 1 / most)
+        confined = self.model.phase.confine(self.motion.phase[speaking, None] * course.share + course.offset)
+        phases = confined.reshape(-1)
+        layout = self.model.layout
+        rows = layout.project_each(phases, self.directions.rows, features).reshape(*confined.shape, -1, len(features))
+        plain = layout.predict(phases, self.model.prior.mean, features).reshape(*confined.shape, -1)
+        mean = plain + np.einsum("psrm,pr->psm", rows, self.means[speaking])
+        var = (rows * (self.covs[speaking][:, None] @ rows)).sum(2)
+        var += self.directions.rest_at(phases, features).reshape(var.shape)
+        over_all = np.tensordot(weights, mean, 1)
+        return over_all, np.tensordot(weights, var + (mean - over_all) ** 2, 1)
+
+
+@dataclass(frozen=True)
+class Rbpf:
+    """Particles over phase and tempo, exact over the weights.
+
+    particles: P, at least 10. Its tempo is positive and may pause, whatever the order of the model's phase prior.
+    Raises OptionError.
+    """
+
+    model: Model
+    particles: int = 200
+
+    def __post_init__(self) -> None:
+        if self.particles < 10:
+            raise OptionError(f"expected at least 10 particles, got {self.particles}")
+
+    @cached_property
+    def directions(self) -> Directions:
+        """As many directions of the prior, the widest first, as carry nearly all of its variance."""
+        layout, factor = self.model.layout, self.model.prior.factor
+        grid = np.linspace(0, 1, PHASES)
+        curves = layout.project_each(grid, factor)  # (PHASES, R, F)
+        # Widest as a movement, not as weights: bases overlap.
+        flat = curves.transpose(1, 0, 2).reshape(len(factor), -1)
+        turn, size, _ = np.linalg.svd(flat, full_matrices=False)
+        share = np.cumsum(size**2) / np.sum(size**2)
+        kept = min(int(np.searchsorted(share, VARIANCE_KEPT)) + 1, MOST_DIRECTIONS, len(factor))
+        rows = turn[:, :kept].T @ factor
+        rest = (curves**2).sum(1) - (layout.project_each(grid, rows) ** 2).sum(1)
+        return Directions(rows, np.maximum(rest, 0.0))
+
+    def init(self, rng: np.random.Generator) -> ParticleBelief:
+        """The prior: every particle knows as little of the weights as the others."""
+        size = len(self.directions.rows)
+        return ParticleBelief(
+            self.model,
+            self.directions,
+            np.zeros(self.particles),
+            begin(self.model.phase, self.particles, rng),
+            np.zeros((self.particles, size)),
+            np.tile(np.eye(size), (self.particles, 1, 1)),
+        )
+
+    def predict(self, belief: ParticleBelief, dt: float, rng: np.random.Generator) -> ParticleBelief:
+        """The particles move on; nothing else does."""
+        if dt == 0:
+            return belief
+        motion = advance(belief.motion, self.model.phase, dt, rng)
+        return ParticleBelief(self.model, belief.directions, belief.log_weights, motion, belief.means, belief.covs)
+
+    def step(
+        self, belief: ParticleBelief, observation: Observation, dt: float, rng: np.random.Generator
+    ) -> tuple[ParticleBelief, StepInfo]:
+        """A Kalman update of every particle's weights (Eq. 2.7 to 2.10); particles count by how well they foresaw."""
+        belief = self.predict(belief, dt, rng)
+        if len(observation) == 0:
+            return belief, StepInfo()
+        layout, phases, features = self.model.layout, belief.motion.phase, observation.features
+        rows = layout.project_each(phases, belief.directions.rows, features)  # Hᵀ, (P, R, M)
+        plain = layout.predict(phases, self.model.prior.mean, features)
+        # The variance that is not filtered lasts as long as the noise does, and is repeated as often.
+        repeats = observation.noise_var / self.model.noise.var[features]
+        noise_var = observation.noise_var + belief.directions.rest_at(phases, features) * repeats
+        innovation = observation.values - plain - np.einsum("prm,pr->pm", rows, belief.means)
+        cross = belief.covs @ rows  # Σ Hᵀ
+        innovation_cov = rows.transpose(0, 2, 1) @ cross  # S, Eq. 2.7
+        diagonal = np.arange(len(features))
+        innovation_cov[:, diagonal, diagonal] += noise_var
+        try:
+            root = np.linalg.cholesky(innovation_cov)
+        except np.linalg.LinAlgError:
+            return belief, StepInfo(healthy=False)
+        both = np.concatenate([innovation[:, :, None], cross.transpose(0, 2, 1)], axis=2)
+        white = np.linalg.solve(root, both)
+        surprise = (white[:, :, 0] ** 2).sum(1)
+        log_det = 2 * np.log(root[:, diagonal, diagonal]).sum(1)
+        log_likelihood = -0.5 * (surprise + log_det + len(features) * np.log(2 * np.pi))
+        if not np.isfinite(log_likelihood).all() or surprise.min() > 1e16 * len(features):
+            return belief, StepInfo(healthy=False)
+        gain = white[:, :, 1:]
+        means = belief.means + np.einsum("pmr,pm->pr", gain, white[:, :, 0])  # Eq. 2.9
+        covs = belief.covs - gain.transpose(0, 2, 1) @ gain  # Eq. 2.10, symmetric by construction
+        before = belief.weights
+        log_weights = np.log(np.maximum(before, 1e-300)) + log_likelihood
+        highest = log_weights.max()
+        info = StepInfo(float(highest + np.log(np.exp(log_weights - highest).sum())), float(before @ surprise))
+        updated = ParticleBelief(self.model, belief.directions, log_weights - highest, belief.motion, means, covs)
+        return _resampled(updated, rng), info
+
+
+def _resampled(belief: ParticleBelief, rng: np.random.Generator) -> ParticleBelief:
+    """The belief itself, or, when few particles carry it, as many new ones that weigh the same."""
+    count = len(belief.weights)
+    if 1 / (belief.weights**2).sum() >= RESAMPLE_BELOW * count:
+        return belief
+    kept = _systematic(belief.weights, count, float(rng.random()))
+    return ParticleBelief(
+        belief.model,
+        belief.directions,
+        np.zeros(count),
+        belief.motion.pick(kept),
+        belief.means[kept],
+        belief.covs[kept],
+    )
+
+
+def _systematic(weights: Float[np.ndarray, " P"], count: int, start: float) -> Int[np.ndarray, " Q"]:
+    """`count` particles, each as often as its weight says, give or take one; start in [0, 1) is the first point."""
+    points = (np.arange(count) + start) / count
+    return np.minimum(np.searchsorted(np.cumsum(weights), points), len(weights) - 1)
