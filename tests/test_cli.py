@@ -548,7 +548,7 @@ def test_what_is_required_and_what_is_not_is_told(run):
 
 def command(*arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:
     """The command line in a process of its own."""
-    environment = {**os.environ, "PYTHONPATH": str(Path(inphase.__file__).parents[1])}
+    environment = {**os.environ, "PYTHONPATH": str(Path(inphase.__file__).parents[1]), "PYTHONUNBUFFERED": ""}
     program = [sys.executable, "-W", "error", "-m", "inphase.cli"]
     return subprocess.run([*program, *arguments], text=True, env=environment, **options)
 

@@ -17,11 +17,15 @@ class WeightPrior:
     """The demonstrations' weights, and the Gaussian made of them.
 
     samples: (N, B) one row a demonstration. shrinkage: 0 … 1, how much of the covariance between weights is taken for
-    chance; the variances stay. Raises OptionError for fewer than two demonstrations or a shrinkage outside 0 … 1.
+    chance; the variances stay. trust: 0 … 1, by how much the correlation between the observed partner, whose are the
+    first `partner` weights, and the controlled one is believed; at 0 the response is the mean movement. Raises
+    OptionError for fewer than two demonstrations, or numbers outside their range.
     """
 
     samples: Float[np.ndarray, "N B"]
     shrinkage: float = 0.0
+    trust: float = 1.0
+    partner: int = 0
 
     def __post_init__(self) -> None:
         freeze(self, samples=self.samples)
@@ -29,6 +33,10 @@ class WeightPrior:
             raise OptionError(f"expected finite weights (N, B) of at least 2 demonstrations, got {self.samples.shape}")
         if not 0 <= self.shrinkage <= 1:
             raise OptionError(f"expected a shrinkage between 0 and 1, got {self.shrinkage}")
+        if not 0 <= self.trust <= 1:
+            raise OptionError(f"expected a trust between 0 and 1, got {self.trust}")
+        if not 0 <= self.partner <= self.samples.shape[1]:
+            raise OptionError(f"expected partner from 0 to {self.samples.shape[1]} weights, got {self.partner}")
 
     @cached_property
     def mean(self) -> Float[np.ndarray, " B"]:
@@ -45,6 +53,11 @@ class WeightPrior:
         rows = [np.sqrt(1 - self.shrinkage) * spread] if self.shrinkage < 1 else []
         if self.shrinkage > 0:
             rows.append(np.diag(np.sqrt(self.shrinkage * (spread**2).sum(0))))
+        if self.trust < 1:
+            shared, alone = np.concatenate(rows), np.concatenate(rows)
+            shared[:, self.partner :] *= self.trust
+            alone[:, : self.partner] = 0.0
+            rows = [shared, np.sqrt(1 - self.trust**2) * alone]
         # The directions of the sample covariance sum to zero and are one too many: rotate that one away.
         _, size, directions = np.linalg.svd(np.concatenate(rows), full_matrices=False)
         kept = size > 1e-10 * max(size[0], np.finfo(float).tiny)
@@ -60,7 +73,15 @@ class WeightPrior:
         return np.asarray(self.mean + rng.standard_normal((count, len(self.factor))) @ self.factor)
 
     def resample(self, count: int, rng: np.random.Generator) -> Float[np.ndarray, "E B"]:
-        """`count` of the demonstrations' own weights, each as often as any other, give or take one (Fig. 23)."""
+        """`count` of the demonstrations' own weights, each as often as any other, give or take one (Fig. 23).
+
+        As far as trust is lacking, the controlled part is that of another demonstration.
+        """
         number = len(self.samples)
         order = np.concatenate([np.tile(np.arange(number), count // number), rng.permutation(number)[: count % number]])
-        return np.asarray(self.samples[order])
+        drawn = self.samples[order]
+        if self.trust < 1:
+            off, other = drawn - self.mean, drawn[rng.permutation(count)] - self.mean
+            mixed = self.mean + self.trust * off + np.sqrt(1 - self.trust**2) * other
+            drawn[:, self.partner :] = mixed[:, self.partner :]
+        return np.asarray(drawn)

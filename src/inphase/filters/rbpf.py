@@ -1,8 +1,8 @@
 """Rao-Blackwellised filter: particles over the phase, each with an exact Kalman filter over the weights.
 
 Given the path of the phase, the weights are linear and Gaussian (Eq. 2.7 to 2.10 without the phase columns of H). So
-only phase and tempo are sampled (DESIGN 4, trap 8), and what makes an extended Kalman filter fail, a phase that is uncertain while the
-movement is curved, is not linearised at all.
+only phase and tempo are sampled (DESIGN 4, trap 8), and what makes an extended Kalman filter fail, a phase that is
+uncertain while the movement is curved, is not linearised at all.
 """
 
 from __future__ import annotations

@@ -124,7 +124,11 @@ def _describe(model: Model, arrays: dict[str, Any]) -> dict[str, Any]:
         ],
         "bases": [{"family": families[type(kind)], **kind.parameters()} for kind in kinds],
         "basis_of_feature": [kinds.index(kind) for kind in model.layout.bases],
-        "prior": {"shrinkage": model.prior.shrinkage},
+        "prior": {
+            "shrinkage": model.prior.shrinkage,
+            "trust": model.prior.trust,
+            "partner": model.prior.partner,
+        },
         "phase": {
             "diffusion": model.phase.diffusion,
             "nominal_velocity": model.phase.nominal_velocity,
@@ -156,7 +160,7 @@ def _build(described: dict[str, Any], arrays: dict[str, Any]) -> Model:
         for c in described["channels"]
     )
     bases = [basis.make(**entry) for entry in described["bases"]]
-    phase = described["phase"]
+    prior, phase = described["prior"], described["phase"]
     if not isinstance(phase["periodic"], bool):
         raise ValueError(f"expected periodic to be true or false, got {phase['periodic']!r}")
     return Model(
@@ -164,7 +168,12 @@ def _build(described: dict[str, Any], arrays: dict[str, Any]) -> Model:
         coordinates=Coordinates(channels, arrays["references"]),
         scaling=Scaling(arrays["low"], arrays["high"]),
         layout=Layout(tuple(bases[_index(i, len(bases))] for i in described["basis_of_feature"])),
-        prior=WeightPrior(arrays["weights"], _number(described["prior"]["shrinkage"])),
+        prior=WeightPrior(
+            arrays["weights"],
+            _number(prior["shrinkage"]),
+            _number(prior["trust"]),
+            _index(prior["partner"], arrays["weights"].shape[-1] + 1),
+        ),
         noise=Noise(arrays["noise_var"], arrays["noise_correlation_time"]),
         phase=PhaseModel(
             arrays["phase_mean"],

@@ -1,8 +1,8 @@
 """Training: from a data set to a model, part by part."""
 
-from inphase.training.discrepancy import held_out_noise
+from inphase.training.discrepancy import leave_one_out
 from inphase.training.fit import fit
 from inphase.training.noise import regression_noise
 from inphase.training.tempo import learn_phase
 
-__all__ = ["fit", "held_out_noise", "learn_phase", "regression_noise"]
+__all__ = ["fit", "learn_phase", "leave_one_out", "regression_noise"]

@@ -7,6 +7,8 @@ only noise, Eq. 2.15 makes every filter trust its partner far too much (DESIGN 4
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Float
 
@@ -19,10 +21,21 @@ ROUNDS = 50  # at most: the noise decides how far the others are bent, which dec
 SETTLED = 0.01  # … until it moves by less than this share
 
 
-def held_out_noise(
+@dataclass(frozen=True)
+class HeldOut:
+    """What leaving each demonstration out tells: the noise of new interactions, and the trust their partners deserve.
+
+    trust: 0 … 1, the share of what the observed partner says of the controlled one that turns out to be so.
+    """
+
+    noise: Noise
+    trust: float
+
+
+def leave_one_out(
     layout: Layout, weights: Float[np.ndarray, "N B"], shown: Float[np.ndarray, " F"], duration: float
-) -> Noise:
-    """The variance and the correlation time of what is left of each demonstration when the others explain it.
+) -> HeldOut:
+    """How each demonstration differs from what the others make of its observed partner.
 
     shown: (F,) 1 for the features of the observed partner, 0 for those of the controlled one, which are explained by
     what the observed ones say. duration: of a typical interaction [s].
@@ -30,32 +43,38 @@ def held_out_noise(
     grid = (np.arange(GRID) + 0.5) / GRID
     curves = np.stack([layout.predict(grid, w) for w in weights])
     var = np.maximum(curves.var(0).mean(0), SMALLEST_STD**2)
+    hidden, spread_var = shown == 0, var
     for _ in range(ROUNDS):
-        left = _left_out(curves, shown, var)
+        target, explained = _by_the_others(curves, shown, var)
+        # The factor that makes the explanation of the hidden features fit best, all demonstrations together.
+        said, true = explained[..., hidden], target[..., hidden]
+        agreed = float((said * true / spread_var[hidden]).sum())
+        trust = float(np.clip(agreed / max(float((said**2 / spread_var[hidden]).sum()), 1e-300), 0.0, 1.0))
+        left = target - np.where(hidden, trust, 1.0) * explained
         before, var = var, np.maximum((left**2).mean((0, 1)), SMALLEST_STD**2)
         if (np.abs(var - before) < SETTLED * before).all():
             break
     times = np.mean([correlation_time(duration * grid, curve) for curve in left], axis=0)
-    return Noise(var, times)
+    return HeldOut(Noise(var, times), trust)
 
 
-def _left_out(
+def _by_the_others(
     curves: Float[np.ndarray, "N P F"], shown: Float[np.ndarray, " F"], noise_var: Float[np.ndarray, " F"]
-) -> Float[np.ndarray, "N P F"]:
-    """Every curve less the others' mean and directions, fitted to what is shown of it.
+) -> tuple[Float[np.ndarray, "N P F"], Float[np.ndarray, "N P F"]]:
+    """Every curve less the others' mean, and the part of it that the others' directions explain.
 
     The fit is the filters' own at a known phase: unit priors on the directions of the others (Eq. 2.14), and noise
     that is correlated for so long that a whole curve says no more than one reading.
     """
     precision = shown / noise_var / curves.shape[1]
-    left = np.empty_like(curves)
+    target, explained = np.empty_like(curves), np.empty_like(curves)
     for i in range(len(curves)):
         others = np.delete(curves, i, axis=0)
         mean = others.mean(0)
         directions = (others - mean) / np.sqrt(max(len(others) - 1, 1))
         flat = directions.reshape(len(others), -1)
         weighted = (directions * precision).reshape(len(others), -1)
-        target = (curves[i] - mean).ravel()
-        coordinates = np.linalg.solve(weighted @ flat.T + np.eye(len(others)), weighted @ target)
-        left[i] = (target - coordinates @ flat).reshape(mean.shape)
-    return left
+        target[i] = curves[i] - mean
+        coordinates = np.linalg.solve(weighted @ flat.T + np.eye(len(others)), weighted @ target[i].ravel())
+        explained[i] = (coordinates @ flat).reshape(mean.shape)
+    return target, explained

@@ -16,7 +16,7 @@ from inphase.noise import Noise
 from inphase.phase import PhaseModel
 from inphase.preprocess.coordinates import Coordinates
 from inphase.preprocess.scaling import Scaling
-from inphase.training.discrepancy import held_out_noise
+from inphase.training.discrepancy import leave_one_out
 from inphase.training.noise import both, regression_noise
 from inphase.training.tempo import learn_phase
 from inphase.trajectory import Dataset
@@ -55,18 +55,18 @@ def fit(
     scaled = [scaling.scale(f) for f in features]
     times, phases = [d.times for d in dataset], [d.phases for d in dataset]
     weights, _ = fit_weights(layout, phases, scaled, names=coordinates.names)
-    if noise is None:
-        shown = [dataset.channels[positions[0]].role is Role.OBSERVED for positions in coordinates.channel_of]
-        noise = both(
-            regression_noise(times, residuals(layout, phases, scaled, weights)),
-            held_out_noise(layout, weights, np.array(shown, dtype=np.float64), 1 / phase.nominal_velocity),
-        )
+    shown = [dataset.channels[positions[0]].role is Role.OBSERVED for positions in coordinates.channel_of]
+    if noise is None or prior is None:
+        duration = 1 / phase.nominal_velocity
+        left_out = leave_one_out(layout, weights, np.array(shown, dtype=np.float64), duration)
+        noise = noise or both(regression_noise(times, residuals(layout, phases, scaled, weights)), left_out.noise)
+        prior = prior or WeightPrior(weights, trust=left_out.trust, partner=layout.slices[shown.index(False)].start)
     return Model(
         channels=dataset.channels,
         coordinates=coordinates,
         scaling=scaling,
         layout=layout,
-        prior=prior if prior is not None else WeightPrior(weights),
+        prior=prior,
         noise=noise,
         phase=phase,
         spread=_spread(coordinates, features),
