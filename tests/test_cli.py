@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 import threading
@@ -20,10 +23,12 @@ from rich.status import Status
 
 import inphase
 from inphase.basis import FAMILIES, Gaussian, Periodic, Polynomial, Sigmoid
+from inphase.channels import Kind
 from inphase.cli import console, main
 from inphase.cli.basis_text import parse_basis, show_basis
 from inphase.evaluation import replay
 from inphase.io.csv import write_csv
+from inphase.preprocess.checks import FindingKind
 
 NAMES = ("hand_x", "hand_y", "robot_x", "robot_y")
 ROLES = ["--observed", "hand_?", "--controlled", "robot_?"]
@@ -288,8 +293,9 @@ def test_fit_learns_what_the_library_learns(here, run):
     expected = inphase.fit(inphase.load("good", "hand_?", "robot_?"))
     assert (model.observed, model.controlled) == (("hand_x", "hand_y"), ("robot_x", "robot_y"))
     assert_allclose(model.prior.samples, expected.prior.samples)
-    assert "2 observed and 2 controlled channels, 4 demonstrations, 48 basis weights" in out
-    assert "wrote new.inphase (3 kB)" in out
+    assert "2 observed and 2 controlled channels, 4 demonstrations" in out
+    assert f"{model.layout.size} basis weights" in out
+    assert re.search(r"wrote new\.inphase \(\d+ kB\)", out)
     assert [name for name in NAMES if name not in out] == []
 
 
@@ -514,7 +520,10 @@ SHOWN = [
 
 @pytest.fixture
 def shown(here: Path) -> None:
-    write(here / "long", names=("left_shoulder_x", "left_shoulder_y", "robot_gripper_opening", "robot_joint_7"))
+    write(
+        here / "long",
+        names=("left_shoulder_of_a_person_who_reaches_out_x", "left_x", "robot_gripper_opening", "robot_joint_7"),
+    )
     (here / "odd").mkdir()
     times, values = episode(1)
     values[15, 1] += 4.0
@@ -634,3 +643,42 @@ def test_nothing_in_the_recordings_is_worse_than_a_warning(folder, shared_data, 
     assert (code, err) == (0, "")
     assert "cannot be used" not in out
     assert "findings" in out or "nothing found" in out
+
+
+# --------------------------------------------------------------------------------------------------- the page on data
+
+PAGE = Path(__file__).parents[1] / "docs" / "data.md"
+
+
+def test_the_page_on_data_is_true(tmp_path, monkeypatch, run):
+    """Its snippets run, on recordings with the columns that it shows; its tables name every kind and finding."""
+    text = PAGE.read_text(encoding="utf-8")
+    blocks = dict.fromkeys(("csv", "python"), "")
+    for language, block in re.findall(r"```(\w+)\n(.*?)```", text, flags=re.DOTALL):
+        blocks[language] += block
+    example = tmp_path / "example.csv"
+    example.write_text(blocks["csv"])
+    shown = inphase.load(example, kinds={"arm": "angle"})
+    assert np.isnan(shown[0].values[1, 1])
+    assert {channel.kind.value for channel in shown.channels[3:]} == {"quaternion"}
+
+    (tmp_path / "handover").mkdir()
+    times = np.linspace(0, 2, 80)
+    for i in range(4):
+        angle = (0.9 + 0.1 * i) * times
+        turn = np.column_stack([0 * angle, 0.1 * angle, np.sin(angle / 2), np.cos(angle / 2)])
+        turn /= np.linalg.norm(turn, axis=1, keepdims=True)
+        columns = np.column_stack([np.sin(angle), np.cos(angle), np.angle(np.exp(1j * (2 + angle))), turn])
+        write_csv(tmp_path / "handover" / f"episode_{i}.csv", shown.names, times, columns)
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    with contextlib.redirect_stdout(io.StringIO()):
+        exec(compile(blocks["python"], PAGE, "exec"), names)
+    assert names["demos"].observed == ("hand_x", "hand_y", "arm")
+    assert names["demos"].channels[0].unit == "m"
+    assert len(names["demos_of_arrays"]) == 3
+    for command in re.findall(r"`inphase (fit .*?)`", text):
+        assert run(*shlex.split(command))[0] == 0
+
+    rows = set(re.findall(r"^\| `([\w-]+)` \|", text, flags=re.MULTILINE))
+    assert rows == {kind.value for kind in (*FindingKind, *Kind)}

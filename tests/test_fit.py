@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import inphase
 from inphase.basis import Gaussian, Periodic, Polynomial, Sigmoid
-from inphase.training import held_out_noise, regression_noise
+from inphase.training import leave_one_out, regression_noise
 
 
 @pytest.fixture
@@ -31,7 +31,7 @@ def parts(model: inphase.Model) -> dict[str, list[np.ndarray]]:
     return {
         "basis": [np.array([repr(basis) for basis in model.layout.bases])],
         "scaling": [model.scaling.low, model.scaling.high],
-        "prior": [model.prior.samples, np.array(model.prior.shrinkage)],
+        "prior": [model.prior.samples, np.array([getattr(model.prior, n) for n in ("shrinkage", "trust", "partner")])],
         "noise": [model.noise.var, model.noise.correlation_time],
         "phase": [model.phase.mean, model.phase.cov, np.array(model.phase.diffusion)],
         "spread": [model.spread],
@@ -318,7 +318,8 @@ def test_the_noise_of_the_regression_is_equation_2_15(demos):
     regression = regression_noise([d.times for d in demos], residuals)
     assert_allclose(model.scaling.unscale_var(regression.var), naive, rtol=1e-9)
     # What a model is given besides is how far a new interaction lies from the old ones.
-    new = held_out_noise(model.layout, model.prior.samples, np.array([1.0, 1, 0, 0]), 1 / model.phase.nominal_velocity)
+    shown, duration = np.array([1.0, 1.0, 0.0, 0.0]), 1 / model.phase.nominal_velocity
+    new = leave_one_out(model.layout, model.prior.samples, shown, duration).noise
     assert_allclose(model.scaling.unscale_var(model.noise.var), naive + model.scaling.unscale_var(new.var), rtol=1e-9)
 
 

@@ -11,7 +11,7 @@ from interactions import shapes_unchecked, wobble
 from inphase.basis import Gaussian, Layout, Polynomial
 from inphase.errors import OptionError
 from inphase.noise import Noise
-from inphase.training.discrepancy import held_out_noise
+from inphase.training.discrepancy import leave_one_out
 from inphase.training.noise import both, regression_noise
 
 GAPS = st.lists(st.floats(1e-3, 50.0), min_size=0, max_size=30).map(np.array)
@@ -173,20 +173,36 @@ def test_what_is_held_out_is_explained_by_the_others_as_a_filter_would(rng: np.r
     weights = rng.normal(size=(6, layout.size)) + 5.0
     phases = (np.arange(grid) + 0.5) / grid
     functions = np.stack([layout.predict(phases, unit).ravel() for unit in np.eye(layout.size)], axis=1)  # (P F, B)
-    held_out = held_out_noise(layout, weights, shown, duration=2.0)
-    left = []
+    held_out = leave_one_out(layout, weights, shown, duration=2.0)
+    target, explained = [], []
     for i, own in enumerate(weights):
         others = np.delete(weights, i, axis=0)
-        mean, cov = others.mean(0), np.cov(others, rowvar=False)
+        off, cov = own - others.mean(0), np.cov(others, rowvar=False)
         seen = np.tile(shown > 0, grid)  # Bayesian linear regression, in the space of the weights
-        design, noise = functions[seen], np.tile(held_out.var, grid)[seen] * grid
+        design, noise = functions[seen], np.tile(held_out.noise.var, grid)[seen] * grid
         gain = cov @ design.T @ np.linalg.inv(design @ cov @ design.T + np.diag(noise))
-        left.append((functions @ (own - mean - gain @ design @ (own - mean))).reshape(grid, 3))
+        target.append((functions @ off).reshape(grid, 3))
+        explained.append((functions @ (gain @ design @ off)).reshape(grid, 3))
+    true, said = np.array(target), np.array(explained)
+    # What the partner says of the hidden feature is believed as far as it turns out to be so: by least squares.
+    trust = min(max((true * said)[..., 2].sum() / (said**2)[..., 2].sum(), 0.0), 1.0)
+    assert held_out.trust == pytest.approx(trust, abs=0.02)
     # The variance that this regression takes for the noise is the one it leaves: searched for until it moves by 1 %.
-    np.testing.assert_allclose(held_out.var, np.mean(np.square(left), axis=(0, 1)), rtol=0.02)
-    longer = held_out_noise(layout, weights, shown, duration=6.0)
-    np.testing.assert_array_equal(longer.var, held_out.var)
-    np.testing.assert_allclose(longer.correlation_time, 3 * held_out.correlation_time)
+    left = true - said * [1.0, 1.0, held_out.trust]
+    np.testing.assert_allclose(held_out.noise.var, (left**2).mean((0, 1)), rtol=0.02)
+    longer = leave_one_out(layout, weights, shown, duration=6.0)
+    np.testing.assert_array_equal(longer.noise.var, held_out.noise.var)
+    np.testing.assert_allclose(longer.noise.correlation_time, 3 * held_out.noise.correlation_time)
+
+
+@pytest.mark.parametrize("related", [True, False])
+def test_a_partner_is_trusted_as_far_as_it_tells(related: bool, rng: np.random.Generator) -> None:
+    layout = Layout((Polynomial(1), Polynomial(1)))
+    partner = rng.normal(size=(40, 2))
+    robot = partner if related else rng.normal(size=(40, 2))
+    trust = leave_one_out(layout, np.concatenate([partner, robot], axis=1), np.array([1.0, 0.0]), 1.0).trust
+    # Out of 40 demonstrations, chance makes a correlation of 1 / sqrt(40).
+    assert trust > 0.95 if related else trust < 0.5
 
 
 def test_noises_of_two_sources_add_up() -> None:

@@ -218,8 +218,9 @@ def test_a_response_may_start_anywhere(name: str, model: inphase.Model, live: tu
     ):
         assert one.mean.shape == (1, 2)
         assert len(whole) == 50
-        np.testing.assert_allclose(one.mean[0], whole.mean[0], rtol=1e-12)
-        np.testing.assert_allclose(one.std[0], whole.std[0], rtol=1e-12)
+        within = 0.2 if name == "rbpf" else 1e-12  # of rbpf's particles, fewer speak for all when more is asked
+        assert (np.abs(one.mean[0] - whole.mean[0]) < within * one.std[0]).all()
+        np.testing.assert_allclose(one.std[0], whole.std[0], rtol=within)
     assert session.respond(samples=1).times[0] == pytest.approx(last.time, abs=1e-12)
 
 
@@ -267,7 +268,8 @@ def test_before_anything_is_seen_the_response_is_the_mean_of_the_demonstrations(
     mean, std = model.distribution([0.5])
     np.testing.assert_allclose(at_half.mean, mean, rtol=1e-12)
     np.testing.assert_allclose(at_half.std, std, rtol=1e-12)
-    drawn = model.session("ebip", members=400).respond(start=0.5, samples=1, channels="*")
+    whole = dataclasses.replace(model, prior=dataclasses.replace(model.prior, trust=1.0))
+    drawn = whole.session("ebip", members=400).respond(start=0.5, samples=1, channels="*")
     # The demonstrations in equal parts: the mean is theirs, the spread as well but for 400 / 399 · 15 / 16.
     np.testing.assert_allclose(drawn.mean, mean, rtol=1e-9)
     spread = (std**2 - model.noise.var * model.scaling.span**2) * 400 / 399 * 15 / 16

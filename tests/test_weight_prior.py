@@ -58,6 +58,30 @@ def test_shrinking_keeps_variances_and_takes_a_share_of_the_rest(
     assert in_proportion(WeightPrior(rows, shrinkage).cov, expected).max() < 1e-9
 
 
+@given(COUNTS, st.integers(2, 12), SEEDS, SHARES, SHARES, st.floats(0, 1))
+def test_trust_is_the_share_of_the_correlation_between_the_partners(
+    count: int, size: int, seed: int, trust: float, shrinkage: float, where: float
+) -> None:
+    rows, partner = samples(count, size, seed), round(where * size)
+    expected = WeightPrior(rows, shrinkage).cov
+    expected[:partner, partner:] *= trust
+    expected[partner:, :partner] *= trust
+    assert in_proportion(WeightPrior(rows, shrinkage, trust, partner).cov, expected).max() < 1e-9
+
+
+@pytest.mark.parametrize("trust", [0.0, 0.6, 1.0])
+def test_resampled_partners_are_as_correlated_as_they_are_trusted(trust: float, rng: np.random.Generator) -> None:
+    rows, count = samples(5, 4, 2), 20_000
+    prior = WeightPrior(rows, trust=trust, partner=2)
+    taken = prior.resample(count, rng)
+    expected = prior.cov * 4 / 5  # of all five, not of a sample of them
+    stds = np.sqrt(np.diag(expected))
+    assert (np.abs(taken.mean(0) - prior.mean) < 4.5 * stds / np.sqrt(count) + 1e-12).all()
+    # The products of two of five values have a kurtosis of their own, below 4: twice the Gaussian's error.
+    assert (np.abs(np.cov(taken, rowvar=False) - expected) < 9 * np.outer(stds, stds) * np.sqrt(2 / count)).all()
+    assert {tuple(row) for row in taken[:, :2]} == {tuple(row) for row in rows[:, :2]}
+
+
 def test_without_demonstrations_that_differ_there_is_no_spread() -> None:
     prior = WeightPrior(np.ones((3, 4)), 0.5)
     np.testing.assert_array_equal(prior.cov, np.zeros((4, 4)))
@@ -109,21 +133,21 @@ def test_drawing_takes_nothing_but_the_seed(count: int, size: int, seed: int) ->
 
 
 @pytest.mark.parametrize(
-    ("rows", "shrinkage"),
+    ("rows", "options"),
     [
-        (np.ones((1, 3)), 0.0),
-        (np.ones((0, 3)), 0.0),
-        (np.ones(3), 0.0),
-        (np.array([[1.0, np.nan], [0.0, 0.0]]), 0.0),
-        (np.array([[1.0, np.inf], [0.0, 0.0]]), 0.0),
-        (np.ones((2, 3)), -0.1),
-        (np.ones((2, 3)), 1.1),
-        (np.ones((2, 3)), np.nan),
+        (np.ones((1, 3)), {}),
+        (np.ones((0, 3)), {}),
+        (np.ones(3), {}),
+        (np.array([[1.0, np.nan], [0.0, 0.0]]), {}),
+        (np.array([[1.0, np.inf], [0.0, 0.0]]), {}),
+        *[(np.ones((2, 3)), {name: value}) for name in ("shrinkage", "trust") for value in (-0.1, 1.1, np.nan)],
+        (np.ones((2, 3)), {"partner": -1}),
+        (np.ones((2, 3)), {"partner": 4}),
     ],
 )
-def test_what_is_no_prior_is_refused(rows: np.ndarray, shrinkage: float) -> None:
+def test_what_is_no_prior_is_refused(rows: np.ndarray, options: dict[str, float]) -> None:
     with shapes_unchecked(), pytest.raises(OptionError, match="expected"):
-        WeightPrior(rows, shrinkage)
+        WeightPrior(rows, **options)
 
 
 def test_a_prior_is_read_only_and_its_own() -> None:

@@ -49,6 +49,7 @@ def describe_model(model: Model) -> dict[str, Any]:
         "controlled": list(model.controlled),
         "demonstrations": len(model.prior.samples),
         "weights": model.layout.size,
+        "trust": model.prior.trust,
         "typical_duration": 1 / model.phase.nominal_velocity,
         "tempo_std": float(phase_std[1] / model.phase.nominal_velocity) if len(phase_std) > 1 else None,
         "order": model.phase.order,
@@ -66,7 +67,8 @@ def print_model(console: Console, model: Model) -> None:
         f"{len(card['observed'])} observed and {len(card['controlled'])} controlled channels, "
         f"{card['demonstrations']} demonstrations, {card['weights']} basis weights\n"
         f"typical duration {card['typical_duration']:.2f} s{tempo}, phase of order {card['order']}"
-        f"{', periodic' if card['periodic'] else ''}"
+        f"{', periodic' if card['periodic'] else ''}\n"
+        f"{100 * card['trust']:.0f} % of what the observed partner says of the controlled one is believed"
     )
     rows = [
         {

@@ -13,6 +13,7 @@ import tyro
 from inphase.cli.console import Output
 from inphase.cli.follow import follow
 from inphase.cli.picture import panel
+from inphase.cli.reading import FilterName
 from inphase.cli.scores import LEGEND, ScoreTable, figures
 from inphase.errors import OptionError, listing
 from inphase.filters import FILTERS
@@ -27,7 +28,7 @@ SHAPES = ("Angle", "GShape", "Sine", "Sshape")
 def demo(
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("inphase-demo"),
     shapes: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SHAPE...")] = SHAPES,
-    filter: str = "ebip",
+    filter: FilterName = "ebip",
     seed: int = 0,
 ) -> int:
     """Learn from real human handwriting, and follow a hand that was never seen.
@@ -35,7 +36,7 @@ def demo(
     Args:
         output: the folder for recordings, models and the picture
         shapes: of the LASA handwriting data set
-        filter: how phase and weights are inferred, bip or ebip
+        filter: how phase and weights are inferred
         seed: of the filter's random numbers
     """
     picture = output / "demo.png"
@@ -65,7 +66,7 @@ def demo(
     for words in (
         ["inspect", model_file],
         ["replay", model_file, recordings / f"{last.name}.csv", "--filter", "bip"],
-        ["fit", recordings, "--observed", "x", "--controlled", "y", "--basis", "gaussian:20", "-o", "my.inphase"],
+        ["fit", recordings, "--observed", "x", "--controlled", "y", "--basis", "gaussian:12", "-o", "my.inphase"],
     ):
         console.print(f"  {_program()} {shlex.join(map(str, words))}")
     return 0

@@ -10,6 +10,7 @@ import tyro
 
 from inphase.channels import Kind
 from inphase.cli.console import waiting
+from inphase.filters import FILTERS
 from inphase.io import load
 from inphase.trajectory import Dataset
 
@@ -19,6 +20,8 @@ Recordings = Annotated[
     tyro.conf.arg(metavar="PATH...", help_behavior_hint="(required)"),
 ]
 AsJson = Annotated[bool, tyro.conf.arg(name="json", help_behavior_hint="")]
+# What there is to choose from stands where others say `STR`: the help is never older than the library.
+FilterName = Annotated[str, tyro.conf.arg(metavar="|".join(FILTERS))]
 Patterns = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME...", help_behavior_hint="")]
 
 

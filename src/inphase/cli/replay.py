@@ -13,7 +13,7 @@ import tyro
 from inphase.cli.console import Output
 from inphase.cli.follow import follow
 from inphase.cli.picture import panel
-from inphase.cli.reading import AsJson, Columns, Format, Recordings
+from inphase.cli.reading import AsJson, Columns, FilterName, Format, Recordings
 from inphase.cli.scores import LEGEND, ScoreTable, figures
 from inphase.evaluation.replay import fitting
 from inphase.io.atomic import check_target
@@ -27,7 +27,7 @@ def replay(
     model: tyro.conf.Positional[Path],
     recordings: Recordings,
     format: tyro.conf.OmitArgPrefixes[Format],
-    filter: str = "ebip",
+    filter: FilterName = "ebip",
     seed: int = 0,
     members: Annotated[int | None, tyro.conf.arg(help_behavior_hint="")] = None,
     picture: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="")] = None,
@@ -39,7 +39,7 @@ def replay(
         model: a model file
         recordings: files, folders or globs of CSV or npz recordings, one episode a file
         format: how the recordings are written
-        filter: how phase and weights are inferred, bip or ebip
+        filter: how phase and weights are inferred
         seed: of the filter's random numbers
         members: the size of the ensemble of ebip; otherwise the filter's choice
         picture: draw the first six replays into this file (.png, .svg or .pdf)

@@ -13,9 +13,11 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
+from inphase.arrays import freeze, frozen
 from inphase.errors import OptionError
 from inphase.filters.belief import Course
 from inphase.filters.filter import StepInfo
+from inphase.filters.gaussian import ABSURD
 from inphase.filters.tempo import Motion, advance, begin
 from inphase.model import Model
 from inphase.observation import Observation
@@ -36,6 +38,9 @@ class Directions:
 
     rows: Float[np.ndarray, "R B"]
     rest: Float[np.ndarray, "_ F"]
+
+    def __post_init__(self) -> None:
+        freeze(self, rows=self.rows, rest=self.rest)
 
     def rest_at(self, phases: Float[np.ndarray, " P"], features: Int[np.ndarray, " M"]) -> Float[np.ndarray, "P M"]:
         """(P, M) the variance that is left over at each phase."""
@@ -65,7 +70,7 @@ class ParticleBelief:
     def weights(self) -> Float[np.ndarray, " P"]:
         """(P,) the probability of each particle."""
         weights = np.exp(self.log_weights - self.log_weights.max())
-        return np.asarray(weights / weights.sum())
+        return frozen(weights / weights.sum())
 
     @cached_property
     def _moving(self) -> Float[np.ndarray, "P K"]:
@@ -178,10 +183,11 @@ class Rbpf:
             return belief, StepInfo(healthy=False)
         both = np.concatenate([innovation[:, :, None], cross.transpose(0, 2, 1)], axis=2)
         white = np.linalg.solve(root, both)
-        surprise = (white[:, :, 0] ** 2).sum(1)
+        with np.errstate(over="ignore", invalid="ignore"):  # an absurd reading is caught below
+            surprise = (white[:, :, 0] ** 2).sum(1)
         log_det = 2 * np.log(root[:, diagonal, diagonal]).sum(1)
         log_likelihood = -0.5 * (surprise + log_det + len(features) * np.log(2 * np.pi))
-        if not np.isfinite(log_likelihood).all() or surprise.min() > 1e16 * len(features):
+        if not np.isfinite(log_likelihood).all() or surprise.min() > ABSURD**2 * len(features):
             return belief, StepInfo(healthy=False)
         gain = white[:, :, 1:]
         means = belief.means + np.einsum("pmr,pm->pr", gain, white[:, :, 0])  # Eq. 2.9

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int
 from inphase.phase import PhaseModel
 
 # Shares and spreads of the logarithm of the tempo, and rates per typical interaction.
-USUAL_SHARE, USUAL_STD = 0.5, 0.05  # interactions at the demonstrations' tempo, give or take 5 %; the others …
+USUAL_SHARE, USUAL_STD = 0.8, 0.05  # interactions at the demonstrations' tempo, give or take 5 %; the others …
 OTHER_STD = 0.5  # … at any: half and double lie at 1.4 standard deviations
 NEW_TEMPO_RATE = 0.5  # a person who changes the tempo for good
 STEADY_SHARE, STEADY_STD = 0.9, 0.05  # stretches at one's tempo; in the others it is anything for a moment …
@@ -32,6 +32,10 @@ class Motion:
     own: Float[np.ndarray, " P"]
     momentary: Float[np.ndarray, " P"]
     waiting: Bool[np.ndarray, " P"]
+
+    def __post_init__(self) -> None:
+        for array in (self.phase, self.own, self.momentary, self.waiting):
+            array.setflags(write=False)
 
     def pick(self, kept: Int[np.ndarray, " Q"]) -> Motion:
         """The motion of some particles, each as often as it is named."""

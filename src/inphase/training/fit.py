@@ -22,7 +22,7 @@ from inphase.training.tempo import learn_phase
 from inphase.trajectory import Dataset
 from inphase.weight_prior import WeightPrior
 
-DEFAULT_SIZE = 12  # basis functions a channel
+DEFAULT_SIZE = 20  # basis functions a channel; what the demonstrations cannot support is left to the noise
 
 
 def fit(
