@@ -28,14 +28,10 @@ SHAPES = ("Line", "Sine")
 def told(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """The folder in which a demo ran, and what it said."""
     folder = tmp_path_factory.mktemp("demo")
-    before = Path.cwd()
     output = io.StringIO()
-    os.chdir(folder)
-    try:
-        with contextlib.redirect_stdout(output):
-            assert main(["demo", "--shapes", *SHAPES, "--filter", "bip", "-o", "my demo"]) == 0
-    finally:
-        os.chdir(before)
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(output):
+        patch.chdir(folder)
+        assert main(["demo", "--shapes", *SHAPES, "--filter", "bip", "-o", "my demo"]) == 0
     return folder, output.getvalue()
 
 

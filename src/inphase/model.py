@@ -115,8 +115,8 @@ class Model:
 
     # The three doors upward (docs/decisions/0001-doors.md): what a user looks for on a model, wherever it lives.
 
-    def session(self, filter: str = "ebip", seed: int = 0, **options: Any) -> Session:
-        """A session that follows one interaction live; `options` are those of the filter.
+    def session(self, filter: str | None = None, seed: int = 0, **options: Any) -> Session:
+        """A session that follows one interaction live; `options` are those of the filter, None the recommended one.
 
         Raises OptionError for an unknown filter or option.
         """

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from inphase.channels import match
 from inphase.errors import ObservationError, OptionError, listing
-from inphase.filters import Belief, Course, StepInfo, make
+from inphase.filters import RECOMMENDED, Belief, Course, StepInfo, make
 from inphase.model import Model
 from inphase.observation import NOTHING, Observation
 from inphase.result import Estimate, Response, Status
@@ -30,9 +30,9 @@ class Session:
     bit. Mistakes raise; trouble is told by the status of the estimate.
     """
 
-    def __init__(self, model: Model, filter: str = "ebip", seed: int = 0, **options: Any) -> None:
+    def __init__(self, model: Model, filter: str | None = None, seed: int = 0, **options: Any) -> None:
         self.model = model
-        self._filter = make(filter, model, **options)
+        self._filter = make(RECOMMENDED if filter is None else filter, model, **options)
         self._seed = seed
         self._index = {name: i for i, name in enumerate(model.names)}
         self._typical_duration = 1.0 / model.phase.nominal_velocity

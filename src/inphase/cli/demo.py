@@ -16,7 +16,7 @@ from inphase.cli.picture import panel
 from inphase.cli.reading import FilterName
 from inphase.cli.scores import LEGEND, ScoreTable, figures
 from inphase.errors import OptionError, listing
-from inphase.filters import FILTERS
+from inphase.filters import FILTERS, RECOMMENDED
 from inphase.io import load
 from inphase.io.handwriting import check_shapes, export_handwriting
 from inphase.report.replay_picture import check_picture, draw_replays
@@ -28,7 +28,7 @@ SHAPES = ("Angle", "GShape", "Sine", "Sshape")
 def demo(
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("inphase-demo"),
     shapes: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SHAPE...")] = SHAPES,
-    filter: FilterName = "ebip",
+    filter: FilterName = RECOMMENDED,
     seed: int = 0,
 ) -> int:
     """Learn from real human handwriting, and follow a hand that was never seen.

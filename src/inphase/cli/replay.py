@@ -16,6 +16,7 @@ from inphase.cli.picture import panel
 from inphase.cli.reading import AsJson, Columns, FilterName, Format, Recordings
 from inphase.cli.scores import LEGEND, ScoreTable, figures
 from inphase.evaluation.replay import fitting
+from inphase.filters import RECOMMENDED
 from inphase.io.atomic import check_target
 from inphase.model import Model
 from inphase.report.replay_picture import check_picture, draw_replays
@@ -27,7 +28,7 @@ def replay(
     model: tyro.conf.Positional[Path],
     recordings: Recordings,
     format: tyro.conf.OmitArgPrefixes[Format],
-    filter: FilterName = "ebip",
+    filter: FilterName = RECOMMENDED,
     seed: int = 0,
     members: Annotated[int | None, tyro.conf.arg(help_behavior_hint="")] = None,
     picture: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="")] = None,

@@ -63,7 +63,9 @@ class Replay:
         return float(sum(m.estimate.log_likelihood for m in self.moments))
 
 
-def replay(model: Model, demonstration: Demonstration, filter: str = "ebip", seed: int = 0, **options: Any) -> Replay:
+def replay(
+    model: Model, demonstration: Demonstration, filter: str | None = None, seed: int = 0, **options: Any
+) -> Replay:
     """Play a demonstration (columns as in `model.names`) to a new session; only the observed channels are shown."""
     moments = tuple(steps(model, demonstration, model.session(filter, seed, **options)))
     return Replay(demonstration.name, moments, model.spread[len(model.observed) :])

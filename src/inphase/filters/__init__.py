@@ -15,8 +15,11 @@ from inphase.model import Model
 
 FILTERS: dict[str, type[Bip] | type[Ebip] | type[Rbpf]] = {"bip": Bip, "ebip": Ebip, "rbpf": Rbpf}
 
+RECOMMENDED = "rbpf"  # for whoever names none: docs/filters.md says why
+
 __all__ = [
     "FILTERS",
+    "RECOMMENDED",
     "Belief",
     "Bip",
     "Course",
