@@ -199,7 +199,7 @@ BAD = [
     (nothing, ["replay", "good/episode_0.csv", "good.inphase"], ["episode_0.csv: not an inphase model"]),
     (damaged_model, ["replay", "damaged_model.inphase", "good"], ["damaged_model.inphase: cut short or damaged"]),
     (nothing, ["replay", "good.inphase", "good", "--filter", "oracle"], ["filter 'oracle'", "bip, ebip"]),
-    (nothing, ["replay", "good.inphase", "good", "--members", "1"], ["at least 2 members, got 1"]),
+    (nothing, ["replay", "good.inphase", "good", "--filter", "ebip", "--members", "1"], ["at least 2 members, got 1"]),
     (nothing, ["replay", "good.inphase", "good", "--filter", "bip", "--members", "9"], ["'bip' has no option members"]),
     (nothing, ["replay", "good.inphase", "good", "--picture", "a.docx"], ["'a.docx'", ".png, .svg, .pdf"]),
     (nothing, ["replay", "good.inphase", "good", "--picture", "no/a.png"], ["no/a.png", "folder no to exist"]),

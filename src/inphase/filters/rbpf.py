@@ -192,11 +192,11 @@ class Rbpf:
         gain = white[:, :, 1:]
         means = belief.means + np.einsum("pmr,pm->pr", gain, white[:, :, 0])  # Eq. 2.9
         covs = belief.covs - gain.transpose(0, 2, 1) @ gain  # Eq. 2.10, symmetric by construction
-        before = belief.weights
-        log_weights = np.log(np.maximum(before, 1e-300)) + log_likelihood
+        log_weights = np.log(np.maximum(belief.weights, 1e-300)) + log_likelihood
         highest = log_weights.max()
-        info = StepInfo(float(highest + np.log(np.exp(log_weights - highest).sum())), float(before @ surprise))
         updated = ParticleBelief(self.model, belief.directions, log_weights - highest, belief.motion, means, covs)
+        # Particles that were somewhere else are surprised without need: it counts for as much as they still do.
+        info = StepInfo(float(highest + np.log(np.exp(log_weights - highest).sum())), float(updated.weights @ surprise))
         return _resampled(updated, rng), info
 
 
