@@ -17,6 +17,7 @@ for variable in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 import inphase  # noqa: E402
+from inphase.filters import FILTERS  # noqa: E402
 
 # channels, basis functions a channel, demonstrations, of the dissertation's experiments (2.5, 3.3)
 SIZES = ((2, 8, 50), (12, 7, 100), (30, 15, 108), (74, 8, 30), (62, 9, 80))
@@ -79,7 +80,7 @@ def main() -> None:
     rows = []
     for channels, size, demonstrations in QUICK if options.quick else SIZES:
         model = make_model(channels, size, demonstrations, rng)
-        for name in ("bip", "ebip"):
+        for name in FILTERS:
             row = measure(model, name, 30 if options.quick else 300, rng)
             row |= {"ratio": (row["observe"] + row["respond"]) / yardstick}
             rows.append({"channels": channels, "basis": size, "demonstrations": demonstrations, "filter": name, **row})

@@ -640,7 +640,7 @@ def test_a_hand_over_is_learned_and_followed(shared_data, tmp_path, monkeypatch,
     assert code == 0
     assert "3 observed and 3 controlled channels, 72 demonstrations" in out
     assert run("inspect", "handover.inphase")[0] == 0
-    code, out, _ = run("replay", "handover.inphase", data / "episode_001.csv", "--json")
+    code, out, _ = run("replay", "handover.inphase", data / "episode_001.csv", "--filter", "ebip", "--json")
     assert code == 0
     (found,) = json.loads(out)
     assert found["nmse"] < 1

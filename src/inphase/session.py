@@ -183,7 +183,8 @@ class Session:
         span = model.scaling.span[observation.features]
         return Estimate(
             time=self._time or 0.0,
-            phase=phase % 1.0 if model.phase.periodic else phase,
+            # A mean of particles that all stand at 1 may round to more.
+            phase=phase % 1.0 if model.phase.periodic else min(max(phase, 0.0), 1.0),
             phase_std=float(np.sqrt(max(var, 0.0))),
             phase_velocity=velocity,
             phase_velocity_std=velocity_std,
