@@ -571,3 +571,14 @@ def test_no_sample_at_all_breaks_a_control_loop(
     assert np.isfinite(response.mean).all()
     assert np.isfinite(response.times).all()
     assert (response.std >= 0).all()
+
+
+@NAMES
+def test_demonstrations_that_are_all_the_same_are_played_back(name: str) -> None:
+    times = np.linspace(0, 2, 50)
+    values = np.stack([np.sin(times), np.cos(times)], axis=1)
+    model = inphase.fit(inphase.Dataset.from_arrays([times] * 2, [values] * 2, ["hand"], ["robot"]))
+    session = model.session(name)
+    for time, (hand, robot) in zip(times, values, strict=True):
+        session.observe(time, [hand])
+        assert session.respond(samples=1).mean[0, 0] == pytest.approx(robot, abs=0.02)

@@ -61,6 +61,7 @@ class WeightPrior:
         # The directions of the sample covariance sum to zero and are one too many: rotate that one away.
         _, size, directions = np.linalg.svd(np.concatenate(rows), full_matrices=False)
         kept = size > 1e-10 * max(size[0], np.finfo(float).tiny)
+        kept[0] = True  # demonstrations that are all the same leave one direction of no length
         return frozen(size[kept, None] * directions[kept])
 
     @property

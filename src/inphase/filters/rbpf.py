@@ -134,7 +134,7 @@ class Rbpf:
         # Widest as a movement, not as weights: bases overlap.
         flat = curves.transpose(1, 0, 2).reshape(len(factor), -1)
         turn, size, _ = np.linalg.svd(flat, full_matrices=False)
-        share = np.cumsum(size**2) / np.sum(size**2)
+        share = np.cumsum(size**2) / max(float(np.sum(size**2)), np.finfo(float).tiny)
         kept = min(int(np.searchsorted(share, VARIANCE_KEPT)) + 1, MOST_DIRECTIONS, len(factor))
         rows = turn[:, :kept].T @ factor
         rest = (curves**2).sum(1) - (layout.project_each(grid, rows) ** 2).sum(1)
