@@ -50,8 +50,17 @@ def test_geometry_is_kept_within_a_group(rng):
         return (a * b).sum(axis=1) / np.linalg.norm(a, axis=1) / np.linalg.norm(b, axis=1)
 
     assert_allclose(angles(scaled), angles(corners), atol=1e-9)
-    # One place for the group too: what two features have equal stays equal.
-    assert_allclose(scaling.scale(np.full(4, 1.7))[hand], scaling.scale(np.full(4, 1.7))[0])
+    assert_allclose(scaling.span[hand], scaling.span[0])  # one unit for the group …
+    assert_allclose(
+        np.nanmin(np.concatenate([scaling.scale(v) for v in values]), axis=0), 0.0, atol=1e-12
+    )  # … from 0 on
+
+
+def test_where_a_channel_lies_does_not_matter_to_its_group(rng):
+    values = recordings(rng)
+    far = [v + np.array([0.0, 1e4, 0.0, 0.0]) for v in values]
+    for v, w in zip(values, far, strict=True):
+        assert_allclose(Scaling.learn(GROUPS, far).scale(w), Scaling.learn(GROUPS, values).scale(v), atol=1e-8)
 
 
 @given(
@@ -81,8 +90,8 @@ def test_what_never_moves_is_named_and_not_stretched():
         np.array([[1.0, nan, 7.0, nan, 0.3, 2.5]]),
     ]
     scaling = Scaling.learn(groups, values)
-    assert_array_equal(scaling.span, [5.0, 5.0, 1.0, 1.0, 1.0, 0.5])
-    assert_array_equal(scaling.offset, [1.0, 1.0, 7.0, 0.0, 0.3, 2.0])
+    assert_array_equal(scaling.span, [2.0, 2.0, 1.0, 1.0, 1.0, 0.5])
+    assert_array_equal(scaling.offset, [1.0, 4.0, 7.0, 0.0, 0.3, 2.0])
     assert_allclose(scaling.scale(np.array([1.0, 6.0, 7.5, 3.0, 1.3, 2.5])), [0, 1, 0.5, 3, 1, 1])
 
 

@@ -48,7 +48,8 @@ class Channel:
         if not self.name:
             raise ChannelError("a channel needs a name, got ''")
         if not self.group:
-            object.__setattr__(self, "group", group_of(self.name))
+            whole = re.sub("_?[xyzwXYZW]$", "", self.name) if self.kind is Kind.QUATERNION else ""
+            object.__setattr__(self, "group", whole or group_of(self.name))
 
 
 def kind_named(value: str) -> Kind:
@@ -61,7 +62,7 @@ def kind_named(value: str) -> Kind:
 
 def group_of(name: str) -> str:
     """The name without its axis: `hand` for `hand_x`, `head_q` for `head_qw`; other names are their own group."""
-    return re.sub(r"(?<=_q)[xyzw]$|_[xyz]$", "", name) or name
+    return re.sub(r"(?<=_q)[xyzw]$|(?<=^q)[xyzw]$|_[xyz]$", "", name) or name
 
 
 def make_channels(

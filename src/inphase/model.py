@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from os import PathLike
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from inphase.arrays import freeze
+from inphase.arrays import freeze, frozen
 from inphase.basis.layout import Layout
 from inphase.channels import Channel, Role, check_channels
 from inphase.errors import OptionError
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from inphase.session import Session
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Model:
     """How two partners move together, learned from demonstrations.
 
@@ -47,7 +46,7 @@ class Model:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "channels", tuple(self.channels))
-        object.__setattr__(self, "provenance", MappingProxyType(dict(self.provenance)))
+        object.__setattr__(self, "provenance", dict(self.provenance))
         freeze(self, spread=self.spread)
         features, weights = self.coordinates.count, self.layout.size
         for what, expected, got in (
@@ -92,14 +91,14 @@ class Model:
         if w.shape != (self.layout.size,):
             raise OptionError(f"expected weights of shape ({self.layout.size},), got {w.shape}")
         mean = self.layout.predict(at, w)
-        return self.to_channels(mean, np.zeros_like(mean))[0]
+        return frozen(self.to_channels(mean, np.zeros_like(mean))[0])
 
     def distribution(self, phases: ArrayLike) -> tuple[Float[np.ndarray, "P D"], Float[np.ndarray, "P D"]]:
         """Mean and standard deviation (P, D) of the channels over new interactions, at phases (P,)."""
         at, everything = self._phases(phases), np.arange(self.layout.count)
-        var = np.array([(self.layout.project(float(p), self.prior.factor, everything) ** 2).sum(0) for p in at])
+        var = (self.layout.project_each(at, self.prior.factor, everything) ** 2).sum(1)
         mean, var = self.to_channels(self.layout.predict(at, self.prior.mean), var + self.noise.var)
-        return mean, np.sqrt(var)
+        return frozen(mean), frozen(np.sqrt(var))
 
     def to_channels(
         self, mean: Float[np.ndarray, "S F"], var: Float[np.ndarray, "S F"]

@@ -11,7 +11,7 @@ from inphase.arrays import freeze
 from inphase.errors import OptionError
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Noise:
     """The variance of every feature's residual, and the time over which it is correlated.
 

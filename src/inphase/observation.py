@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Observation:
     """The rows of one sample that were seen; the others do not exist for a filter (DESIGN 4, trap 1).
 

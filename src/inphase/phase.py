@@ -14,7 +14,7 @@ from inphase.errors import OptionError
 ORDERS = (0, 1, 2)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PhaseModel:
     """A prior over phase and its derivatives, and the white noise that drives the highest one.
 
@@ -86,8 +86,12 @@ class PhaseModel:
         )
 
     def confine(self, phases: Float[np.ndarray, "*E"]) -> Float[np.ndarray, "*E"]:
-        """Phases brought back to where they make sense: clipped to [0, 1]; when periodic, turned back together.
+        """Phases brought back to where they make sense: into [0, 1], or when periodic within half a turn of their mean.
 
-        Turning all of them by the same whole number keeps the spread of an ensemble that straddles 1 whole.
+        That mean is one on the circle, in [0, 1): an ensemble that straddles 1 keeps its spread, and members that are
+        whole cycles apart are at the same place.
         """
-        return np.asarray(phases - np.floor(phases.mean()) if self.periodic else np.clip(phases, 0.0, 1.0))
+        if not self.periodic:
+            return np.asarray(np.clip(phases, 0.0, 1.0))
+        centre = np.angle(np.exp(2j * np.pi * phases).mean()) / (2 * np.pi) % 1.0
+        return np.asarray(phases - np.round(phases - centre))

@@ -18,7 +18,8 @@ class Status(str, enum.Enum):
     NOTHING_SEEN = "nothing was seen in this sample: the estimate is a prediction"
     BLIND = "nothing has been seen for long: the estimate is a prediction and drifts"
     UNLIKE = "the partner moves unlike any demonstration: do not trust the response"
-    COLLAPSED = "the belief has collapsed and was not updated: reset the session"
+    REFUSED = "the readings lie far outside all demonstrations and were not used: the estimate is a prediction"
+    COLLAPSED = "the sample could not be used: if this goes on, reset the session"
     FINISHED = "the interaction is over"
 
     @property
@@ -44,7 +45,7 @@ class Estimate:
     status: Status
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Response:
     """What the channels should read from now on, with a standard deviation; all arrays are read-only.
 

@@ -16,9 +16,11 @@ from inphase.model import Model
 from inphase.observation import NOTHING, Observation
 from inphase.result import Estimate, Response, Status
 
+FAR = 2.0  # ranges beyond all that was demonstrated: no reading of this partner
 BLIND_AFTER = 0.1  # of a typical interaction with nothing seen, and the estimate is called blind
-UNLIKE_ABOVE = 9.0  # surprise a reading, averaged: as if every reading lay three standard deviations off
+UNLIKE_ABOVE = 3.0  # squared distance of a reading from what is believed of it, in its variance, averaged; usually ≤ 1
 UNLIKE_WITHIN = 0.05  # of a typical interaction, the time constant of that average
+NOW = Course(np.ones(1), np.zeros(1))
 FINISHED_AT, AGAIN_BELOW = 0.99, 0.95  # phases where the end is told and taken back: no flicker in between
 SLOWEST = 0.05  # of the typical tempo: a response to a partner who stands still must end some time
 
@@ -46,8 +48,9 @@ class Session:
         self._time: float | None = None
         self._last_seen = np.full(self.model.coordinates.count, -np.inf)
         self._last_sight: float | None = None
-        self._surprise = 1.0
+        self._misfit = 1.0
         self._finished = False
+        self._refused = False
 
     @property
     def belief(self) -> Belief:
@@ -67,7 +70,7 @@ class Session:
         was seen is a prediction alone. Raises ObservationError for a time that runs backwards, a wrong number of
         values or an unknown name.
         """
-        time = float(time)
+        time = float(_number(time, "time"))
         if not np.isfinite(time) or (self._time is not None and time < self._time):
             expected = "a finite time" if self._time is None else f"a time of at least {self._time:g} s"
             raise ObservationError(f"expected {expected}, got {time:g} s; reset() begins a new interaction")
@@ -108,7 +111,10 @@ class Session:
         phase, velocity = self._belief.phase_mean[0], self._velocity()[0]
         phases = course.share * phase + course.offset
         phases = phases if model.phase.periodic else np.clip(phases, 0.0, 1.0)
-        duration = (phases - phase) / max(velocity, SLOWEST * model.phase.nominal_velocity)
+        ahead = phases - phase
+        if model.phase.periodic:
+            ahead += max(np.ceil(phase - phases[0]), 0.0)  # a phase that has passed comes again in the next cycle
+        duration = ahead / max(velocity, SLOWEST * model.phase.nominal_velocity)
         return Response(
             times=(self._time or 0.0) + duration,
             phases=phases % 1.0 if model.phase.periodic else phases,
@@ -124,7 +130,7 @@ class Session:
             for name, value in values.items():
                 if name not in self._index:
                     raise ObservationError(f"unknown channel {name!r}; the channels are {listing(self._index)}")
-                sample[self._index[name]] = _numbers(value, [name])
+                sample[self._index[name]] = _number(value, name)
         else:
             observed = self.model.observed
             array = _numbers(values, observed)
@@ -143,12 +149,17 @@ class Session:
         else:
             # Angles and rotations are read on the branch that lies nearest to what is expected of them.
             mean = self._belief.phase_mean
-            phase = model.phase.confine((model.phase.transition(dt) @ mean)[:1])
+            phase = model.phase.confine(mean[:1] + self._velocity()[0] * dt)
             near = model.scaling.unscale(model.layout.predict(phase, self._belief.weights_mean)[0])
             values = model.coordinates.sample(sample, near)
         noise_var = model.noise.at(time - self._last_seen)
-        seen = np.flatnonzero(np.isfinite(values) & np.isfinite(noise_var))
-        return Observation(seen, model.scaling.scale(values)[seen], noise_var[seen])
+        scaled = model.scaling.scale(values)
+        # One reading in the wrong unit would move the belief for good. The gate is one of values, not of surprise: a
+        # filter that is lost has to hear what surprises it.
+        near = np.abs(scaled - 0.5) <= 0.5 + FAR  # NaN is not near
+        self._refused = bool((np.isfinite(scaled) & ~near).any())
+        seen = np.flatnonzero(near & np.isfinite(noise_var))
+        return Observation(seen, scaled[seen], noise_var[seen])
 
     def _course(self, lookahead: float, start: float | None, samples: int) -> Course:
         if not (isinstance(samples, (int, np.integer)) and samples >= 1):
@@ -179,7 +190,7 @@ class Session:
         velocity, velocity_std = self._velocity()
         if len(observation):
             keep = np.exp(-dt / (UNLIKE_WITHIN * self._typical_duration))
-            self._surprise = keep * self._surprise + (1 - keep) * info.surprise / len(observation)
+            self._misfit = keep * self._misfit + (1 - keep) * self._distance(observation)
         span = model.scaling.span[observation.features]
         return Estimate(
             time=self._time or 0.0,
@@ -192,16 +203,36 @@ class Session:
             status=self._status(observation, info, phase),
         )
 
+    def _distance(self, observation: Observation) -> float:
+        """How far the readings lie from what is believed of them now, squared, in units of their variance.
+
+        Not the filter's surprise: correlated noise makes each of many readings count for little there, and a partner
+        who does something else for a whole interaction surprises no sample in particular.
+        """
+        mean, var = self._belief.trajectory(NOW, observation.features)
+        spread_var = var[0] + self.model.noise.var[observation.features]
+        return float(np.mean((observation.values - mean[0]) ** 2 / spread_var))
+
     def _status(self, observation: Observation, info: StepInfo, phase: float) -> Status:
         if not info.healthy:
             return Status.COLLAPSED
         if len(observation) == 0:
             unseen = (self._time or 0.0) - (self._last_sight or 0.0)
-            return Status.BLIND if unseen > BLIND_AFTER * self._typical_duration else Status.NOTHING_SEEN
-        if self._surprise > UNLIKE_ABOVE:
+            for_long = unseen > BLIND_AFTER * self._typical_duration
+            if self._refused:
+                return Status.UNLIKE if for_long else Status.REFUSED
+            return Status.BLIND if for_long else Status.NOTHING_SEEN
+        if self._misfit > UNLIKE_ABOVE:
             return Status.UNLIKE
         self._finished = phase >= (AGAIN_BELOW if self._finished else FINISHED_AT) and not self.model.phase.periodic
         return Status.FINISHED if self._finished else Status.FOLLOWING
+
+
+def _number(value: object, name: str) -> float:
+    array = _numbers(value, [name])
+    if array.ndim:
+        raise ObservationError(f"expected one number for {name}, got {value!r}")
+    return float(array)
 
 
 def _numbers(values: object, names: Sequence[str]) -> Float[np.ndarray, ...]:

@@ -9,16 +9,16 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from inphase.arrays import freeze
+from inphase.arrays import freeze, frozen
 from inphase.channels import Channel, Kind, Role, check_channels, group_of, make_channels
-from inphase.errors import DataError, listing
+from inphase.errors import DataError, OptionError, listing
 
 SHORTEST = 3  # samples: two span a line and say nothing about a movement
 QUATERNION_NORM = (0.9, 1.1)  # what four channels named like a quaternion must measure to be taken for one …
 QUATERNION_SHARE = 0.9  # … in this share of samples: a tracker that lost its target may write zeros
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Demonstration:
     """One recorded interaction of both partners.
 
@@ -66,10 +66,10 @@ class Demonstration:
     @property
     def phases(self) -> Float[np.ndarray, " T"]:
         """(T,) the share of the interaction that is over at every sample: 0 at the first, 1 at the last (2.3.1)."""
-        return np.asarray((self.times - self.times[0]) / self.duration)
+        return frozen((self.times - self.times[0]) / self.duration)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Dataset:
     """Demonstrations of one interaction over the same channels, the observed ones first.
 
@@ -155,7 +155,9 @@ class Dataset:
         return Dataset(self.channels, tuple(self.demonstrations[i] for i in indices), self.provenance)
 
     def without(self, index: int) -> Dataset:
-        """The data set less one demonstration, as leave-one-out needs it."""
+        """The data set less one demonstration, as leave-one-out needs it; raises OptionError where there is none."""
+        if not -len(self) <= index < len(self):
+            raise OptionError(f"expected a demonstration from {-len(self)} to {len(self) - 1}, got {index}")
         return self.subset([i for i in range(len(self)) if i != index % len(self)])
 
 

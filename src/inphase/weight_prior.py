@@ -12,7 +12,7 @@ from inphase.arrays import freeze, frozen
 from inphase.errors import OptionError
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WeightPrior:
     """The demonstrations' weights, and the Gaussian made of them.
 
@@ -47,7 +47,7 @@ class WeightPrior:
     def factor(self) -> Float[np.ndarray, "R B"]:
         """(R, B) directions with Σ_ww = factorᵀ factor (Eq. 2.14): a weight vector is mean + c @ factor, c ~ N(0, I).
 
-        Without shrinkage R < N: the exact filters then work in as few dimensions as there are demonstrations.
+        Without shrinkage R < N, twice that where trust is lacking: the exact filters work in as few dimensions.
         """
         spread = (self.samples - self.mean) / np.sqrt(len(self.samples) - 1)
         rows = [np.sqrt(1 - self.shrinkage) * spread] if self.shrinkage < 1 else []

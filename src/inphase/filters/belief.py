@@ -1,4 +1,4 @@
-"""What a filter believes: a Gaussian or an ensemble, both with the same read-only face."""
+"""What a filter believes: a Gaussian, an ensemble or particles, all with the same read-only face."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float, Int
 
-from inphase.arrays import freeze
+from inphase.arrays import freeze, frozen
 from inphase.model import Model
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Course:
     """Which phases to look at: those at share · φ + offset, φ being the phase that is believed in.
 
@@ -46,7 +46,7 @@ class Belief(Protocol):
         """Mean and variance (S, M) of h(φ, w) along a course, in scaled units, less the observation noise."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GaussianBelief:
     """A Gaussian over phase and the coordinates c of the weights in the prior's directions: w = mean + c @ factor.
 
@@ -76,7 +76,7 @@ class GaussianBelief:
     @property
     def weights_mean(self) -> Float[np.ndarray, " B"]:
         prior = self.model.prior
-        return np.asarray(prior.mean + self.mean[self._size :] @ prior.factor)
+        return frozen(prior.mean + self.mean[self._size :] @ prior.factor)
 
     @property
     def weights_cov(self) -> Float[np.ndarray, "B B"]:
@@ -91,16 +91,13 @@ class GaussianBelief:
         phases = self.model.phase.confine(course.share * self.mean[0] + course.offset)
         mean = layout.predict(phases, weights, features)
         slope = layout.slope(phases, weights, features) * course.share[:, None]
-        var = np.empty_like(mean)
-        for i, phase in enumerate(phases):
-            rows = np.zeros((len(features), len(self.mean)))  # the Jacobian of Eq. 2.6, in the prior's directions
-            rows[:, 0] = slope[i]
-            rows[:, self._size :] = layout.project(float(phase), factor, features).T
-            var[i] = np.einsum("mi,ij,mj->m", rows, self.cov, rows, optimize=True)
-        return mean, np.maximum(var, 0.0)
+        rows = np.zeros((*mean.shape, len(self.mean)))  # the Jacobian of Eq. 2.6, in the prior's directions
+        rows[..., 0] = slope
+        rows[..., self._size :] = layout.project_each(phases, factor, features).transpose(0, 2, 1)
+        return mean, np.maximum(((rows @ self.cov) * rows).sum(2), 0.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EnsembleBelief:
     """Members that are all equally likely (3.1). members: (E, K + B), a state [φ, φ̇, …, w] a row."""
 
@@ -116,16 +113,16 @@ class EnsembleBelief:
 
     @property
     def phase_mean(self) -> Float[np.ndarray, " K"]:
-        return np.asarray(self.members[:, : self._size].mean(0))
+        return frozen(self.members[:, : self._size].mean(0))
 
     @property
     def phase_cov(self) -> Float[np.ndarray, "K K"]:
         size = self._size
-        return np.cov(self.members[:, :size], rowvar=False).reshape(size, size)
+        return frozen(np.cov(self.members[:, :size], rowvar=False).reshape(size, size))
 
     @property
     def weights_mean(self) -> Float[np.ndarray, " B"]:
-        return np.asarray(self.members[:, self._size :].mean(0))
+        return frozen(self.members[:, self._size :].mean(0))
 
     def trajectory(
         self, course: Course, features: Int[np.ndarray, " M"]

@@ -24,6 +24,8 @@ class Bip:
 
     def init(self, rng: np.random.Generator) -> GaussianBelief:
         """The prior N(μ₀, Σ₀) of Eq. 2.13 and 2.14."""
+        import scipy.linalg  # noqa: F401 - here, so that the first live sample need not wait for it
+
         phase, directions = self.model.phase, len(self.model.prior.factor)
         size = len(phase.mean)
         cov = np.eye(size + directions)

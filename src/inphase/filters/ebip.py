@@ -30,13 +30,15 @@ class Ebip:
     prior: str = "demonstrations"
 
     def __post_init__(self) -> None:
-        if self.members is not None and self.members < 2:
-            raise OptionError(f"expected at least 2 members, got {self.members}")
+        if self.members is not None and (not isinstance(self.members, (int, np.integer)) or self.members < 2):
+            raise OptionError(f"expected a whole number of at least 2 members, got {self.members!r}")
         if self.prior not in PRIORS:
             raise OptionError(f"unknown prior {self.prior!r}; one of {listing(PRIORS)}")
 
     def init(self, rng: np.random.Generator) -> EnsembleBelief:
         """The initial ensemble X₀ of Fig. 23; phase and tempo are drawn from their prior."""
+        import scipy.linalg  # noqa: F401 - here, so that the first live sample need not wait for it
+
         phase, prior = self.model.phase, self.model.prior
         count = self.members if self.members is not None else max(100, len(prior.samples))
         moving = phase.mean + rng.standard_normal((count, len(phase.mean))) @ _root(phase.cov).T

@@ -19,7 +19,7 @@ class StepInfo:
 
     log_likelihood: of the sample given all before, in scaled units; 0 where nothing was seen. surprise: the innovation
     squared in units of its covariance, rᵀ S⁻¹ r, to be compared with the number of readings. healthy: False when the
-    step could not be made; the belief is then the one before.
+    sample could not be used; the belief is then the predicted one.
     """
 
     log_likelihood: float = 0.0

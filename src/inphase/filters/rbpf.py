@@ -29,7 +29,7 @@ PHASES = 100  # at which the rest of the variance is tabulated
 LOOKED_AT = 2000  # phases in a response, particles times samples; fewer particles speak for all when there are more
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Directions:
     """The few directions of the prior in which weights are filtered, and what they leave of its variance.
 
@@ -48,7 +48,7 @@ class Directions:
         return np.asarray(self.rest[nearest.astype(np.int64)][:, features])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ParticleBelief:
     """Particles of phase and tempo, each with a Gaussian over the weights in the filter's directions.
 
@@ -78,16 +78,16 @@ class ParticleBelief:
 
     @property
     def phase_mean(self) -> Float[np.ndarray, " K"]:
-        return np.asarray(self.weights @ self._moving)
+        return frozen(self.weights @ self._moving)
 
     @property
     def phase_cov(self) -> Float[np.ndarray, "K K"]:
         off = self._moving - self.phase_mean
-        return np.asarray((off * self.weights[:, None]).T @ off)
+        return frozen((off * self.weights[:, None]).T @ off)
 
     @property
     def weights_mean(self) -> Float[np.ndarray, " B"]:
-        return np.asarray(self.model.prior.mean + self.weights @ self.means @ self.directions.rows)
+        return frozen(self.model.prior.mean + self.weights @ self.means @ self.directions.rows)
 
     def trajectory(
         self, course: Course, features: Int[np.ndarray, " M"]
@@ -96,7 +96,8 @@ class ParticleBelief:
         speaking = np.arange(len(self.weights))
         weights = self.weights
         if len(weights) > most:
-            speaking = _systematic(weights, most, 0.5)
+            order = np.argsort(self.motion.phase)  # so that those who speak stand where all of them stand
+            speaking = order[_systematic(weights[order], most, 0.5)]
             weights = np.full(most, 1 / most)
         confined = self.model.phase.confine(self.motion.phase[speaking, None] * course.share + course.offset)
         phases = confined.reshape(-1)
@@ -122,8 +123,8 @@ class Rbpf:
     particles: int = 200
 
     def __post_init__(self) -> None:
-        if self.particles < 10:
-            raise OptionError(f"expected at least 10 particles, got {self.particles}")
+        if not isinstance(self.particles, (int, np.integer)) or self.particles < 10:
+            raise OptionError(f"expected a whole number of at least 10 particles, got {self.particles!r}")
 
     @cached_property
     def directions(self) -> Directions:

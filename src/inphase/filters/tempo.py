@@ -17,10 +17,11 @@ STEADY_SHARE, STEADY_STD = 0.9, 0.05  # stretches at one's tempo; in the others 
 STRETCH_RATE = 7.0  # … with so many stretches
 STOP_RATE, GO_RATE = 0.5, 7.0  # a pause now and then, over after a seventh of an interaction
 LONGEST_STEP = 0.02  # of a typical interaction: a long gap is crossed in several
+MOST_STEPS = 200  # after four whole interactions out of sight nothing is known any more
 PHASE_JITTER = 0.005  # after a typical interaction, so that particles that were copied part
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Motion:
     """Where each particle is and how it moves.
 
@@ -62,7 +63,7 @@ def advance(motion: Motion, phase: PhaseModel, dt: float, rng: np.random.Generat
 
     Tempo is constant but for stretches that begin at random, so that how often samples come makes no difference.
     """
-    steps = int(np.ceil(phase.nominal_velocity * dt / LONGEST_STEP))
+    steps = min(int(np.ceil(phase.nominal_velocity * dt / LONGEST_STEP)), MOST_STEPS)
     for _ in range(steps):
         motion = _step(motion, phase, dt / steps, rng)
     return motion

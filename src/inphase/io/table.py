@@ -12,7 +12,7 @@ from inphase.arrays import freeze
 from inphase.errors import DataError, listing
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Table:
     """The columns of one recording, unchecked: times may run backwards and values may be anything.
 

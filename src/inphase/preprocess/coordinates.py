@@ -23,7 +23,7 @@ from inphase.preprocess.reference import reference_angle, reference_orientation
 TAU = 2 * np.pi
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Coordinates:
     """How the D channels of a recording are written as F features, and back.
 

@@ -15,9 +15,9 @@ from inphase.errors import OptionError, listing
 ROUNDING = 1e-12  # of the size of the values: a feature that moves less than this does not move
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scaling:
-    """Brings every feature to 0 … 1 over the demonstrations; features of one group share `low` and `high`.
+    """Brings every feature to 0 … 1 over the demonstrations; features of one group share their span, each from its own low.
 
     low, high: (F,) what becomes 0 and 1; where both are the same, 1 is one unit above `low`.
     Raises OptionError where high is below low.
@@ -44,8 +44,9 @@ class Scaling:
         lowest = np.fmin.reduce(everything, axis=0, initial=np.inf)
         highest = np.fmax.reduce(everything, axis=0, initial=-np.inf)
         members = [[f for f, other in enumerate(groups) if other == group] for group in groups]
-        bottom = np.array([lowest[together].min() for together in members])
-        top = np.array([highest[together].max() for together in members])
+        bottom = lowest
+        with np.errstate(invalid="ignore"):  # a feature that was never seen spans -inf
+            top = lowest + np.array([(highest - lowest)[together].max() for together in members])
         low = np.where(np.isfinite(bottom), bottom, 0.0)
         return cls(low, np.where(_still(bottom, top), low, top))
 

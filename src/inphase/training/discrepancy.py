@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from inphase.basis import Layout
 from inphase.noise import Noise
@@ -21,7 +21,7 @@ ROUNDS = 50  # at most: the noise decides how far the others are bent, which dec
 SETTLED = 0.01  # … until it moves by less than this share
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class HeldOut:
     """What leaving each demonstration out tells: the noise of new interactions, and the trust their partners deserve.
 
@@ -33,29 +33,35 @@ class HeldOut:
 
 
 def leave_one_out(
-    layout: Layout, weights: Float[np.ndarray, "N B"], shown: Float[np.ndarray, " F"], duration: float
+    layout: Layout,
+    weights: Float[np.ndarray, "N B"],
+    shown: Float[np.ndarray, " F"],
+    duration: float,
+    seen: Bool[np.ndarray, "N F"] | None = None,
 ) -> HeldOut:
     """How each demonstration differs from what the others make of its observed partner.
 
     shown: (F,) 1 for the features of the observed partner, 0 for those of the controlled one, which are explained by
-    what the observed ones say. duration: of a typical interaction [s].
+    what the observed ones say. duration: of a typical interaction [s]. seen: (N, F) whether a demonstration has the
+    feature at all; curves that stand in for one prove nothing.
     """
     grid = (np.arange(GRID) + 0.5) / GRID
     curves = np.stack([layout.predict(grid, w) for w in weights])
     var = np.maximum(curves.var(0).mean(0), SMALLEST_STD**2)
     hidden, spread_var = shown == 0, var
+    known = np.ones(curves.shape) if seen is None else np.broadcast_to(seen[:, None, :], curves.shape).astype(float)
     for _ in range(ROUNDS):
         target, explained = _by_the_others(curves, shown, var)
         # The factor that makes the explanation of the hidden features fit best, all demonstrations together.
-        said, true = explained[..., hidden], target[..., hidden]
+        said, true = (explained * known)[..., hidden], target[..., hidden]
         agreed = float((said * true / spread_var[hidden]).sum())
         trust = float(np.clip(agreed / max(float((said**2 / spread_var[hidden]).sum()), 1e-300), 0.0, 1.0))
         left = target - np.where(hidden, trust, 1.0) * explained
-        before, var = var, np.maximum((left**2).mean((0, 1)), SMALLEST_STD**2)
+        before, var = var, np.maximum((left**2 * known).sum((0, 1)) / known.sum((0, 1)), SMALLEST_STD**2)
         if (np.abs(var - before) < SETTLED * before).all():
             break
-    times = np.mean([correlation_time(duration * grid, curve) for curve in left], axis=0)
-    return HeldOut(Noise(var, times), trust)
+    lasting = np.array([correlation_time(duration * grid, curve) for curve in left])
+    return HeldOut(Noise(var, (lasting * known[:, 0]).sum(0) / known[:, 0].sum(0)), trust)
 
 
 def _by_the_others(

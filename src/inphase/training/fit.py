@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from inphase.basis import Basis, Gaussian, Layout, Periodic
 from inphase.basis.fit import fit_weights, residuals
-from inphase.channels import Role, quaternions, spread
+from inphase.channels import Kind, Role, quaternions, spread
 from inphase.errors import DataError, OptionError, listing
 from inphase.model import Model
 from inphase.noise import Noise
@@ -22,6 +22,7 @@ from inphase.training.tempo import learn_phase
 from inphase.trajectory import Dataset
 from inphase.weight_prior import WeightPrior
 
+STILL = 1e-12  # of a channel's size: it does not move
 DEFAULT_SIZE = 20  # basis functions a channel; what the demonstrations cannot support is left to the noise
 
 
@@ -48,6 +49,7 @@ def fit(
     values = [demonstration.values for demonstration in dataset]
     coordinates = Coordinates.learn(dataset.channels, values)
     features = [coordinates.from_channels(v) for v in values]
+    _check_movement(dataset, coordinates, features)
     scaling = scaling if scaling is not None else Scaling.learn(coordinates.groups, features)
     if len(scaling.low) != coordinates.count:
         raise OptionError(f"scaling: expected {coordinates.count} features, got {len(scaling.low)}")
@@ -57,8 +59,8 @@ def fit(
     weights, _ = fit_weights(layout, phases, scaled, names=coordinates.names)
     shown = [dataset.channels[positions[0]].role is Role.OBSERVED for positions in coordinates.channel_of]
     if noise is None or prior is None:
-        duration = 1 / phase.nominal_velocity
-        left_out = leave_one_out(layout, weights, np.array(shown, dtype=np.float64), duration)
+        duration, seen = 1 / phase.nominal_velocity, np.array([np.isfinite(curve).any(0) for curve in scaled])
+        left_out = leave_one_out(layout, weights, np.array(shown, dtype=np.float64), duration, seen)
         noise = noise or both(regression_noise(times, residuals(layout, phases, scaled, weights)), left_out.noise)
         prior = prior or WeightPrior(weights, trust=left_out.trust, partner=layout.slices[shown.index(False)].start)
     return Model(
@@ -82,18 +84,22 @@ def _check(dataset: Dataset) -> None:
             raise DataError(
                 f"expected at least one {role} channel, got none; the channels are {listing(dataset.names)}"
             )
-    parts = quaternions(dataset.channels)
-    for i, name in enumerate(dataset.names):
-        # A wrist that turns about one axis leaves others at 0: what has to move is the quaternion, not each number.
-        together = next((list(part) for part in parts if i in part), [i])
-        seen = np.concatenate([demonstration.values[:, together] for demonstration in dataset])
-        seen = seen[np.isfinite(seen).all(1)]
-        if len(seen) == 0:
-            raise DataError(f"channel {name!r}: expected readings, got none in any of {len(dataset)} demonstrations")
-        if (np.ptp(seen, axis=0) <= 1e-12 * np.abs(seen).max()).all():
+
+
+def _check_movement(dataset: Dataset, coordinates: Coordinates, features: Sequence[Float[np.ndarray, "_ F"]]) -> None:
+    """Every channel, and every quaternion as a whole, has to have been seen and to move, by more than full turns."""
+    raw, everything = np.concatenate([demonstration.values for demonstration in dataset]), np.concatenate(features)
+    for positions in dict.fromkeys(coordinates.channel_of):
+        channel, count = dataset.channels[positions[0]], len(dataset)
+        curves = everything[:, [f for f, of in enumerate(coordinates.channel_of) if of == positions]]
+        seen = np.isfinite(curves).all(1)
+        if not seen.any():
+            raise DataError(f"channel {channel.name!r}: expected readings, got none in any of {count} demonstrations")
+        size = np.abs(curves[seen]).max() if channel.kind is Kind.LINEAR else 1.0
+        if (np.ptp(curves[seen], axis=0) <= STILL * size).all():
             raise DataError(
-                f"channel {name!r}: expected a channel that moves, got {seen[0, together.index(i)]:g} in every sample "
-                f"of all {len(dataset)} demonstrations; leave it out"
+                f"channel {channel.name!r}: expected a channel that moves, got {raw[seen][0, positions[0]]:g} in every "
+                f"sample of all {count} demonstrations; leave it out"
             )
 
 

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from inphase.noise import Noise
 
-SMALLEST_STD = 1e-4  # of a channel's range: no sensor and no basis is better
+SMALLEST_STD = 1e-4  # of a group's range: no sensor and no basis is better
 
 
 def regression_noise(times: Sequence[Float[np.ndarray, " _"]], residuals: Sequence[Float[np.ndarray, "_ F"]]) -> Noise:
