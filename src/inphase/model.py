@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from inphase.arrays import freeze, frozen
 from inphase.basis.layout import Layout
 from inphase.channels import Channel, Role, check_channels
-from inphase.errors import OptionError
+from inphase.errors import OptionError, listing
 from inphase.noise import Noise
 from inphase.phase import PhaseModel
 from inphase.preprocess.coordinates import Coordinates
@@ -69,6 +69,12 @@ class Model:
                 f"expected phase and basis to be both periodic or both not, got phase.periodic={self.phase.periodic} "
                 f"and a basis with periodic={self.layout.periodic}"
             )
+
+    def __repr__(self) -> str:
+        return (
+            f"Model(observed: {listing(self.observed)}; controlled: {listing(self.controlled)}; "
+            f"{len(self.prior.samples)} demonstrations of {1 / self.phase.nominal_velocity:.2f} s)"
+        )
 
     @property
     def names(self) -> tuple[str, ...]:

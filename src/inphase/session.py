@@ -40,6 +40,9 @@ class Session:
         self._typical_duration = 1.0 / model.phase.nominal_velocity
         self.reset()
 
+    def __repr__(self) -> str:
+        return f"Session({self._filter.__class__.__name__.lower()} of {self.model!r}, time={self._time})"
+
     def reset(self, seed: int | None = None) -> None:
         """Begin a new interaction, with a new seed or the same again."""
         self._seed = self._seed if seed is None else seed

@@ -58,6 +58,10 @@ class Demonstration:
     def __len__(self) -> int:
         return len(self.times)
 
+    def __repr__(self) -> str:
+        samples, channels = self.values.shape
+        return f"Demonstration({self.name!r}, {samples} samples of {channels} channels, {self.duration:.2f} s)"
+
     @property
     def duration(self) -> float:
         """From the first sample to the last [s]."""
@@ -128,6 +132,10 @@ class Dataset:
 
     def __len__(self) -> int:
         return len(self.demonstrations)
+
+    def __repr__(self) -> str:
+        roles = f"observed: {listing(self.observed)}; controlled: {listing(self.controlled)}"
+        return f"Dataset({len(self)} demonstrations, {roles})"
 
     def __iter__(self) -> Iterator[Demonstration]:
         return iter(self.demonstrations)

@@ -31,6 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: Sequence[str]) -> int:
     import tyro
+    from threadpoolctl import threadpool_limits
 
     from inphase.cli.demo import demo
     from inphase.cli.fit import fit
@@ -45,11 +46,13 @@ def _run(arguments: Sequence[str]) -> int:
         "inspect": inspect,
         "replay": replay,
     }
-    code: int = tyro.extras.subcommand_cli_from_dict(
-        commands,
-        prog="inphase",
-        description="Learn from recordings how two partners move together, then move with one of them live.",
-        args=arguments,
-        config=(tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone),
-    )
+    # The products of a filter are small: two threads make each slower, many times so on a busy machine.
+    with threadpool_limits(limits=1):
+        code: int = tyro.extras.subcommand_cli_from_dict(
+            commands,
+            prog="inphase",
+            description="Learn from recordings how two partners move together, then move with one of them live.",
+            args=arguments,
+            config=(tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone),
+        )
     return code

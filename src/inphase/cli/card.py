@@ -14,6 +14,8 @@ from inphase.cli.console import counted
 from inphase.model import Model
 from inphase.trajectory import Dataset
 
+LITTLE_TRUST = 0.1
+
 
 def describe_model(model: Model) -> dict[str, Any]:
     """What a model holds, as plain values for people and machines."""
@@ -67,8 +69,7 @@ def print_model(console: Console, model: Model) -> None:
         f"{len(card['observed'])} observed and {len(card['controlled'])} controlled channels, "
         f"{card['demonstrations']} demonstrations, {card['weights']} basis weights\n"
         f"typical duration {card['typical_duration']:.2f} s{tempo}, phase of order {card['order']}"
-        f"{', periodic' if card['periodic'] else ''}\n"
-        f"{100 * card['trust']:.0f} % of what the observed partner says of the controlled one is believed"
+        f"{', periodic' if card['periodic'] else ''}\n" + _trust_in_words(card["trust"])
     )
     rows = [
         {
@@ -85,6 +86,12 @@ def print_model(console: Console, model: Model) -> None:
         for row in card["features"]
     ]
     console.print(_table(rows, numbers=("from", "to", "noise ±", "lasts [s]")), soft_wrap=False)
+
+
+def _trust_in_words(trust: float) -> str:
+    if trust < LITTLE_TRUST:
+        return "the partner's movement tells nothing of the controlled one: only its timing"
+    return f"what the partner's movement tells of the controlled one: believed to {100 * trust:.0f} %"
 
 
 def describe_dataset(dataset: Dataset) -> dict[str, Any]:

@@ -20,7 +20,7 @@ import numpy as np
 from inphase import basis
 from inphase.basis import Layout
 from inphase.channels import Channel, Kind, Role
-from inphase.errors import InphaseError, ModelFileError
+from inphase.errors import InphaseError, ModelFileError, OptionError
 from inphase.io.atomic import whole_file
 from inphase.model import Model
 from inphase.noise import Noise
@@ -37,7 +37,15 @@ LARGEST_PAYLOAD = 2 * 2**30  # bytes
 
 
 def write_model(model: Model, path: str | PathLike[str]) -> None:
-    """Write a model file, whole or not at all; raises OptionError where the folder is not there."""
+    """Write a model file, whole or not at all.
+
+    Raises OptionError where the folder is not there, or something stands there that is no model.
+    """
+    there = Path(path)
+    if there.is_file() and there.stat().st_size:
+        with there.open("rb") as file:
+            if file.read(len(MAGIC)) != MAGIC:
+                raise OptionError(f"cannot write {there}: expected a model or nothing there, got another file")
     arrays = _arrays(model)
     header = json.dumps(_describe(model, arrays), ensure_ascii=False, allow_nan=False).encode()
     payload = b"".join(np.ascontiguousarray(array, dtype="<f8").tobytes() for array in arrays.values())

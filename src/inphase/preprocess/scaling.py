@@ -17,7 +17,7 @@ ROUNDING = 1e-12  # of the size of the values: a feature that moves less than th
 
 @dataclass(frozen=True, eq=False)
 class Scaling:
-    """Brings every feature to 0 … 1 over the demonstrations; features of one group share their span, each from its own low.
+    """Brings every feature to 0 … 1 over the demonstrations, those of a group by one span, each from its own low.
 
     low, high: (F,) what becomes 0 and 1; where both are the same, 1 is one unit above `low`.
     Raises OptionError where high is below low.

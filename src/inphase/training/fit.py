@@ -44,6 +44,8 @@ def fit(
     Raises DataError for fewer than two demonstrations, no controlled channel, or a channel that never moves;
     ChannelError for a pattern that fits nothing; OptionError for parts that do not fit each other.
     """
+    if not isinstance(dataset, Dataset):
+        raise DataError(f"expected a Dataset, as inphase.load makes one, got {type(dataset).__name__}")
     _check(dataset)
     phase = phase if phase is not None else learn_phase(dataset)
     values = [demonstration.values for demonstration in dataset]
@@ -119,6 +121,9 @@ def _bases(
     default: Basis = Periodic(DEFAULT_SIZE) if periodic else Gaussian(DEFAULT_SIZE)
     if basis is None:
         basis = default
+    for one in basis.values() if isinstance(basis, Mapping) else [basis]:
+        if not isinstance(one, Basis):
+            raise OptionError(f"basis: expected one of inphase.basis, such as Gaussian(20), got {one!r}")
     if not isinstance(basis, Mapping):
         return (basis,) * coordinates.count
     by_channel = spread(basis, dataset.names)
