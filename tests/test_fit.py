@@ -432,3 +432,17 @@ def test_channels_of_a_group_are_scaled_together(rng):
     assert_array_equal(scaling.low[:2], everything[:, :2].min(axis=0))
     assert_allclose(scaling.span[:2], [np.ptp(everything[:, :2], axis=0).max()] * 2)
     assert_array_equal(scaling.low[2:], everything[:, 2:].min(axis=0))
+
+
+def test_a_channel_that_some_never_saw_costs_no_trust(rng):
+    """The controlled channel follows from the partner; demonstrations without it prove nothing against that."""
+    times = np.linspace(0, 2, 40)
+    sizes = rng.uniform(0.5, 1.5, 16)
+    values = [np.stack([a * np.sin(times), a * np.cos(times)], axis=1) for a in sizes]
+    for curve in values[:6]:
+        curve[:, 1] = np.nan
+    trusts = [
+        inphase.fit(inphase.Dataset.from_arrays([times] * len(part), part, ["hand"], ["robot"])).prior.trust
+        for part in (values, values[6:])
+    ]
+    assert trusts == pytest.approx([1.0, 1.0], abs=0.05)

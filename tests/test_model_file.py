@@ -569,3 +569,14 @@ def test_where_a_model_cannot_be_saved(tmp_path):
     with pytest.raises(inphase.OptionError, match="expected a file name, got a folder"):
         tiny().save(tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_another_file_is_not_written_over(tmp_path):
+    recording = tmp_path / "recording.csv"
+    recording.write_text("time,x,y\n0,1,2\n")
+    model = inphase.Model.load(RELEASED / "model_v1.inphase")
+    with pytest.raises(inphase.OptionError, match="expected a model or nothing there"):
+        model.save(recording)
+    assert recording.read_text().startswith("time")
+    model.save(tmp_path / "model.inphase")
+    model.save(tmp_path / "model.inphase")

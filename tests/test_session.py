@@ -581,3 +581,55 @@ def test_demonstrations_that_are_all_the_same_are_played_back(name: str) -> None
     for time, (hand, robot) in zip(times, values, strict=True):
         session.observe(time, [hand])
         assert session.respond(samples=1).mean[0, 0] == pytest.approx(robot, abs=0.02)
+
+
+@NAMES
+@pytest.mark.parametrize("what", ["a dead sensor", "the other way round"])
+def test_a_partner_who_does_something_else_is_told(name: str, what: str, model: inphase.Model, live: tuple) -> None:
+    times, samples = partner(live)
+    strange = np.zeros((len(times), 2)) - 0.5 if what == "a dead sensor" else np.array(samples)[:, ::-1] * [1.0, -1.0]
+    assert Status.UNLIKE in {e.status for e in watch(model.session(name), times, list(strange))}
+
+
+@NAMES
+def test_one_wild_reading_does_no_harm(name: str, model: inphase.Model, live: tuple) -> None:
+    times, samples = partner(live)
+    struck = [sample * 1000 if i == len(times) // 4 else sample for i, sample in enumerate(samples)]
+    ends = []
+    for shown in (samples, struck):
+        session = model.session(name)
+        watch(session, times, shown)
+        ends.append(session.respond(samples=1))
+    np.testing.assert_allclose(ends[1].mean, ends[0].mean, atol=float(ends[0].std.max()))
+
+
+@NAMES
+def test_a_clock_that_jumps_ahead_is_survived(name: str, model: inphase.Model) -> None:
+    session = model.session(name)
+    session.observe(0.0, {"reach": 0.1})
+    estimate = session.observe(1.7e9, {"reach": 0.1})
+    assert np.isfinite([estimate.phase, estimate.phase_std, estimate.phase_velocity]).all()
+
+
+@NAMES
+def test_a_rhythm_is_found_again_after_cycles_out_of_sight(name: str, rhythm: inphase.Model) -> None:
+    duration = 1 / rhythm.phase.nominal_velocity
+    session, errors = rhythm.session(name), []
+    for i in range(240):
+        time = i * duration / 40
+        phase = (time / duration) % 1.0
+        seen = rhythm.predict([phase])[0, :2] if not 80 <= i < 160 else np.full(2, np.nan)
+        estimate = session.observe(time, seen)
+        errors.append(abs((estimate.phase - phase + 0.5) % 1.0 - 0.5))
+    assert max(errors[-40:]) < 0.1
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+@NAMES
+def test_angles_are_followed_with_any_phase_model(name: str, order: int, demos: inphase.Dataset) -> None:
+    channels = demos.observed, demos.controlled
+    times, values = [d.times for d in demos], [d.values for d in demos]
+    turned = inphase.Dataset.from_arrays(times, values, *channels, kinds={demos.observed[0]: "angle"})
+    session = inphase.fit(turned, phase=inphase.learn_phase(turned, order)).session(name)
+    for time, row in zip(demos[0].times, demos[0].values, strict=True):
+        assert np.isfinite(session.observe(time, row[:2]).phase)
