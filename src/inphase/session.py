@@ -18,7 +18,7 @@ from inphase.result import Estimate, Response, Status
 
 FAR = 2.0  # ranges beyond all that was demonstrated: no reading of this partner
 BLIND_AFTER = 0.1  # of a typical interaction with nothing seen, and the estimate is called blind
-UNLIKE_ABOVE = 3.0  # squared distance of a reading from what is believed of it, in its variance, averaged; usually ≤ 1
+UNLIKE_ABOVE = 4.0  # squared distance of a reading from what is believed of it, in its variance, averaged; usually ≤ 1
 UNLIKE_WITHIN = 0.05  # of a typical interaction, the time constant of that average
 NOW = Course(np.ones(1), np.zeros(1))
 FINISHED_AT, AGAIN_BELOW = 0.99, 0.95  # phases where the end is told and taken back: no flicker in between
