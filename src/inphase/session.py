@@ -70,7 +70,8 @@ class Session:
 
         time: [s], never earlier than the last. values: the observed channels in their order, or {name: value} of any
         channels, controlled ones too; what is NaN, infinite or left out was not seen, and a sample in which nothing
-        was seen is a prediction alone. Raises ObservationError for a time that runs backwards, a wrong number of
+        was seen is a prediction alone. So is one that lies more than two ranges outside all demonstrations
+        (Status.REFUSED). Raises ObservationError for a time that runs backwards, a wrong number of
         values or an unknown name.
         """
         time = float(_number(time, "time"))
