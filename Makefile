@@ -9,10 +9,10 @@ PIP := PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt PIP_D
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint bench clean
+.PHONY: help demo test lint bench accuracy clean
 
 help:  ## what there is to make
-	@sed -n 's/^\([a-z]*\):.*##/make \1#/p' Makefile | while IFS='#' read -r target what; do printf '%-12s%s\n' "$$target" "$$what"; done
+	@sed -n 's/^\([a-z]*\):.*##/make \1#/p' Makefile | while IFS='#' read -r target what; do printf '%-14s%s\n' "$$target" "$$what"; done
 
 demo: $(VENV)/demo  ## learn from real handwriting, and follow a recording that was left out
 	$(BIN)/inphase demo $(ARGS)
@@ -29,6 +29,9 @@ lint: $(VENV)/dev  ## style, types and arrows
 
 bench: $(VENV)/demo  ## how long a step takes
 	$(BIN)/python benchmarks/step_time.py $(ARGS)
+
+accuracy: $(VENV)/demo  ## how accurate the filters are on the recordings beside this folder: half an hour
+	$(BIN)/python benchmarks/accuracy.py $(ARGS)
 
 clean:  ## remove the environment and what the tools leave behind
 	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 from jaxtyping import config
@@ -29,6 +30,11 @@ def shapes_unchecked() -> Iterator[None]:
         yield
     finally:
         config.update("jaxtyping_disable", False)
+
+
+def taught(demos: inphase.Dataset, **options: Any) -> inphase.Model:
+    """A model of all that can be learned without playing held-out demonstrations, which takes its time."""
+    return inphase.fit(demos, calibrate=False, **options)
 
 
 def curves(phases: np.ndarray, style: np.ndarray) -> np.ndarray:

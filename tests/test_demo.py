@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from interactions import taught
 from numpy.testing import assert_allclose
 
 import inphase
@@ -59,7 +60,7 @@ def test_the_models_are_of_all_demonstrations_but_the_last(told):
     for shape in SHAPES:
         model = inphase.Model.load(told[0] / "my demo" / f"{shape}.inphase")
         demos = inphase.load(told[0] / "my demo" / shape, observed=["x"], controlled=["y"])
-        assert_allclose(model.prior.samples, inphase.fit(demos.without(-1)).prior.samples)
+        assert_allclose(model.prior.samples, taught(demos.without(-1)).prior.samples)
         assert {channel.unit for channel in model.channels} == {"mm"}
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from interactions import CONTROLLED, OBSERVED, curves, dataset
+from interactions import CONTROLLED, OBSERVED, curves, dataset, taught
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
@@ -122,7 +122,7 @@ ODD = [pair, shortest, irregular, holes, lengths, large_and_small, constant_each
 def test_nothing_is_set_by_hand(make, filter, rng):
     """Whatever the data, a model comes out, and it answers with finite numbers and a doubt."""
     demos = make(rng)
-    model = inphase.fit(demos)
+    model = taught(demos)
     mean, std = model.distribution(np.linspace(0, 1, 7))
     assert mean.shape == std.shape == (7, len(demos.names))
     assert np.isfinite(mean).all()
@@ -142,12 +142,12 @@ def test_nothing_is_set_by_hand(make, filter, rng):
 
 def test_learning_takes_nothing_from_chance_and_changes_nothing(demos):
     before = [d.values.tobytes() for d in demos]
-    assert differing(inphase.fit(demos), inphase.fit(demos)) == set()
+    assert differing(taught(demos), taught(demos)) == set()
     assert [d.values.tobytes() for d in demos] == before
 
 
 def test_the_order_of_demonstrations_does_not_matter(demos):
-    model, turned = inphase.fit(demos), inphase.fit(demos.subset([3, 0, 5, 1, 4, 2]))
+    model, turned = taught(demos), taught(demos.subset([3, 0, 5, 1, 4, 2]))
     assert_allclose(turned.prior.samples, model.prior.samples[[3, 0, 5, 1, 4, 2]], atol=1e-9)
     for name in ("scaling", "noise", "phase", "spread"):
         for one, other in zip(parts(turned)[name], parts(model)[name], strict=True):
@@ -156,14 +156,14 @@ def test_the_order_of_demonstrations_does_not_matter(demos):
 
 def test_provenance_says_where_it_came_from(demos):
     named = inphase.Dataset(demos.channels, demos.demonstrations, {"source": "the attic"})
-    assert dict(inphase.fit(named).provenance) == {"source": "the attic", "demonstrations": "6"}
+    assert dict(taught(named).provenance) == {"source": "the attic", "demonstrations": "6"}
 
 
 # ------------------------------------------------------------------------------------------------------- the keywords
 
 
 def test_a_basis_replaces_the_basis(demos):
-    usual, other = inphase.fit(demos), inphase.fit(demos, basis=Sigmoid(7))
+    usual, other = taught(demos), taught(demos, basis=Sigmoid(7))
     assert other.layout.bases == (Sigmoid(7),) * 4
     # Weights and what they leave unexplained are in terms of the basis.
     assert differing(usual, other) == {"basis", "prior", "noise"}
@@ -172,7 +172,7 @@ def test_a_basis_replaces_the_basis(demos):
 def test_a_scaling_replaces_the_scaling(demos):
     scaling = inphase.Scaling(np.array([-1.0, -2.0, 0.0, -3.0]), np.array([1.0, 3.0, 5.0, 3.0]))
     # Polynomials can be constant, and so do not care what is called zero.
-    usual, other = (inphase.fit(demos, basis=Polynomial(7), scaling=s) for s in (None, scaling))
+    usual, other = (taught(demos, basis=Polynomial(7), scaling=s) for s in (None, scaling))
     assert other.scaling is scaling
     assert differing(usual, other) == {"scaling", "prior", "noise"}
     # What the model says, it says in the units of the channels.
@@ -181,54 +181,54 @@ def test_a_scaling_replaces_the_scaling(demos):
 
 
 def test_a_prior_replaces_the_prior(demos, rng):
-    usual = inphase.fit(demos)
+    usual = taught(demos)
     prior = inphase.WeightPrior(rng.standard_normal((3, usual.layout.size)), shrinkage=0.5)
-    other = inphase.fit(demos, prior=prior)
+    other = taught(demos, prior=prior)
     assert other.prior is prior
     assert differing(usual, other) == {"prior"}
 
 
 def test_a_noise_replaces_the_noise(demos):
     noise = inphase.Noise(np.full(4, 0.02), np.full(4, 0.3))
-    other = inphase.fit(demos, noise=noise)
+    other = taught(demos, noise=noise)
     assert other.noise is noise
-    assert differing(inphase.fit(demos), other) == {"noise"}
+    assert differing(taught(demos), other) == {"noise"}
 
 
 @pytest.mark.parametrize("order", [0, 2])
 def test_a_phase_replaces_the_phase(order, demos):
     phase = inphase.learn_phase(demos, order=order)
-    other = inphase.fit(demos, phase=phase)
+    other = taught(demos, phase=phase)
     assert other.phase is phase
-    assert differing(inphase.fit(demos), other) == {"phase"}
+    assert differing(taught(demos), other) == {"phase"}
 
 
 def test_a_periodic_phase_brings_a_periodic_basis(demos):
     phase = inphase.learn_phase(demos, periodic=True)
-    model = inphase.fit(demos, phase=phase)
+    model = taught(demos, phase=phase)
     assert all(isinstance(basis, Periodic) for basis in model.layout.bases)
     assert_allclose(model.predict([0.0]), model.predict([1.0]), atol=1e-12)
     with pytest.raises(inphase.OptionError, match=r"both periodic or both not, got phase\.periodic=True"):
-        inphase.fit(demos, phase=phase, basis=Gaussian(9))
+        taught(demos, phase=phase, basis=Gaussian(9))
     with pytest.raises(inphase.OptionError, match=r"both periodic or both not, got phase\.periodic=False"):
-        inphase.fit(demos, basis=Periodic(9))
+        taught(demos, basis=Periodic(9))
 
 
 def test_a_basis_by_name_and_pattern(demos):
-    usual = inphase.fit(demos).layout.bases[0]
+    usual = taught(demos).layout.bases[0]
     assert isinstance(usual, Gaussian)
-    model = inphase.fit(demos, basis={"*t": Sigmoid(5), "grip": Polynomial(4)})
+    model = taught(demos, basis={"*t": Sigmoid(5), "grip": Polynomial(4)})
     assert model.layout.bases == (usual, Sigmoid(5), Polynomial(4), usual)
     # What comes later is for those that what came before did not mean.
-    model = inphase.fit(demos, basis={"*": Sigmoid(5), "grip": Polynomial(4)})
+    model = taught(demos, basis={"*": Sigmoid(5), "grip": Polynomial(4)})
     assert model.layout.bases == (Sigmoid(5), Sigmoid(5), Polynomial(4), Sigmoid(5))
-    assert inphase.fit(demos, basis={}).layout.bases == (usual,) * 4
+    assert taught(demos, basis={}).layout.bases == (usual,) * 4
     with pytest.raises(inphase.ChannelError, match=r"no channel fits 'griper'; the channels are reach, lift, grip"):
-        inphase.fit(demos, basis={"griper": Sigmoid(5)})
+        taught(demos, basis={"griper": Sigmoid(5)})
 
 
 def test_a_basis_for_one_channel_is_nothing_to_the_others(demos):
-    usual, other = inphase.fit(demos), inphase.fit(demos, basis={"grip": Polynomial(4)})
+    usual, other = taught(demos), taught(demos, basis={"grip": Polynomial(4)})
     for name in ("reach", "lift", "turn"):
         i = OBSERVED.index(name) if name in OBSERVED else 2 + CONTROLLED.index(name)
         ours, theirs = (m.prior.samples[:, m.layout.slices[i]] for m in (usual, other))
@@ -236,17 +236,17 @@ def test_a_basis_for_one_channel_is_nothing_to_the_others(demos):
 
 
 def test_the_basis_of_a_quaternion_is_that_of_its_channels(rng):
-    model = inphase.fit(turns(rng), basis={"head_q?": Sigmoid(6), "arm": Polynomial(5)})
+    model = taught(turns(rng), basis={"head_q?": Sigmoid(6), "arm": Polynomial(5)})
     assert model.layout.bases[:4] == (Polynomial(5), Sigmoid(6), Sigmoid(6), Sigmoid(6))
 
 
 def test_parts_that_do_not_fit(demos):
     with pytest.raises(inphase.OptionError, match="scaling: expected 4 features, got 3"):
-        inphase.fit(demos, scaling=inphase.Scaling.none(3))
+        taught(demos, scaling=inphase.Scaling.none(3))
     with pytest.raises(inphase.OptionError, match="features of the noise: expected 4, got 2"):
-        inphase.fit(demos, noise=inphase.Noise(np.ones(2), np.zeros(2)))
+        taught(demos, noise=inphase.Noise(np.ones(2), np.zeros(2)))
     with pytest.raises(inphase.OptionError, match=r"weights of the prior: expected \d+, got 5"):
-        inphase.fit(demos, prior=inphase.WeightPrior(np.eye(5)))
+        taught(demos, prior=inphase.WeightPrior(np.eye(5)))
 
 
 # -------------------------------------------------------------------------------------------------------- bad data
@@ -254,17 +254,17 @@ def test_parts_that_do_not_fit(demos):
 
 def test_one_demonstration_is_too_few(demos):
     with pytest.raises(inphase.DataError, match=r"at least 2 demonstrations to learn from, got 1 \(demonstration 0\)"):
-        inphase.fit(demos.subset([0]))
+        taught(demos.subset([0]))
 
 
 def test_both_partners_are_needed(demos):
     times, values = [d.times for d in demos], [d.values for d in demos]
     alone = inphase.Dataset.from_arrays(times, values, [*OBSERVED, *CONTROLLED], [])
     with pytest.raises(inphase.DataError, match="one controlled channel, got none; the channels are reach, lift, grip"):
-        inphase.fit(alone)
+        taught(alone)
     alone = inphase.Dataset.from_arrays(times, values, [], [*OBSERVED, *CONTROLLED])
     with pytest.raises(inphase.DataError, match="one observed channel, got none; the channels are reach, lift, grip"):
-        inphase.fit(alone)
+        taught(alone)
 
 
 @pytest.mark.parametrize("level", [0.0, -3.5, 1e6])
@@ -272,13 +272,13 @@ def test_a_channel_that_never_moves_is_named(level, demos):
     values = [np.column_stack([d.values[:, :2], np.full(len(d), level), d.values[:, 3]]) for d in demos]
     values[1][3, 2] = np.nan
     with pytest.raises(inphase.DataError, match=rf"channel 'grip': .* moves, got {re.escape(f'{level:g}')} in every"):
-        inphase.fit(of([d.times for d in demos], values))
+        taught(of([d.times for d in demos], values))
 
 
 def test_a_channel_that_is_never_seen_is_named(demos):
     values = [np.column_stack([d.values[:, :1], np.full(len(d), np.nan), d.values[:, 2:]]) for d in demos]
     with pytest.raises(inphase.DataError, match=r"channel 'lift': expected readings, got none in any of 6"):
-        inphase.fit(of([d.times for d in demos], values))
+        taught(of([d.times for d in demos], values))
 
 
 def test_a_hand_that_turns_about_one_axis_only_is_no_channel_that_never_moves(rng):
@@ -289,14 +289,14 @@ def test_a_hand_that_turns_about_one_axis_only_is_no_channel_that_never_moves(rn
         values.append(np.column_stack([np.sin(times), Rotation.from_euler("z", angle[:, None]).as_quat()]))
     names = [f"hand_q{axis}" for axis in "xyzw"]
     demos = inphase.Dataset.from_arrays([times] * 4, values, ["reach"], names)
-    mean, std = inphase.fit(demos).distribution(np.linspace(0, 1, 5))
+    mean, std = taught(demos).distribution(np.linspace(0, 1, 5))
     assert_allclose(np.linalg.norm(mean[:, 1:], axis=1), 1)
     assert_allclose(mean[:, 1:3], 0, atol=2e-3)
     assert np.isfinite(std).all()
     still = [np.column_stack([v[:, :1], np.tile([0.0, 0.0, 0.6, 0.8], (50, 1))]) for v in values]
     dead = inphase.Dataset.from_arrays([times] * 4, still, ["reach"], names)
     with pytest.raises(inphase.DataError, match="hand_q"):
-        inphase.fit(dead)
+        taught(dead)
 
 
 # ------------------------------------------------------------------------------------------------------ the equations
@@ -304,7 +304,7 @@ def test_a_hand_that_turns_about_one_axis_only_is_no_channel_that_never_moves(rn
 
 def test_the_noise_of_the_regression_is_equation_2_15(demos):
     """R is the mean over demonstrations of the mean squared residual, here in the units of the channels."""
-    model = inphase.fit(demos)
+    model = taught(demos)
     naive = np.zeros(4)
     for demonstration, weights in zip(demos, model.prior.samples, strict=True):
         squares = np.zeros(4)
@@ -328,7 +328,7 @@ def test_white_noise_is_found_again(rng):
     std, phases = 0.05, np.linspace(0, 1, 100)
     smooth = Polynomial(7)(phases)
     values = [smooth @ rng.standard_normal((8, 4)) + std * rng.standard_normal((100, 4)) for _ in range(10)]
-    model = inphase.fit(of([phases] * 10, values), basis=Polynomial(7))
+    model = taught(of([phases] * 10, values), basis=Polynomial(7))
     left = [v - model.predict(phases, weights) for v, weights in zip(values, model.prior.samples, strict=True)]
     found = regression_noise([phases] * 10, left)
     assert_allclose(found.var, std**2 * (1 - 8 / 100), rtol=5 * np.sqrt(2 / 1000))
@@ -337,7 +337,7 @@ def test_white_noise_is_found_again(rng):
 def test_the_tempo_is_equation_2_12(rng):
     durations = [1.0, 2.0, 4.0]
     made = [np.linspace(10, 10 + duration, 30) for duration in durations]
-    model = inphase.fit(of(made, [curves(np.linspace(0, 1, 30), rng.standard_normal(2)) for _ in made]))
+    model = taught(of(made, [curves(np.linspace(0, 1, 30), rng.standard_normal(2)) for _ in made]))
     assert_allclose(model.phase.nominal_velocity, (1 + 1 / 2 + 1 / 4) / 3)
     assert_allclose(model.phase.mean, [0, (1 + 1 / 2 + 1 / 4) / 3])
 
@@ -345,7 +345,7 @@ def test_the_tempo_is_equation_2_12(rng):
 def test_the_weights_are_those_of_ridge_regression(demos):
     """(ΦᵀΦ + T ridge I)(w - w̄) = Φᵀ(y - Φ w̄), a channel and a demonstration at a time; w̄ of all together alike."""
     ridge, basis = 1e-6, Sigmoid(6)
-    model = inphase.fit(demos, basis=basis)
+    model = taught(demos, basis=basis)
     for i in range(4):
         low, high = min(d.values[:, i].min() for d in demos), max(d.values[:, i].max() for d in demos)
         rows = [(basis(d.phases), (d.values[:, i] - low) / (high - low)) for d in demos]
@@ -360,7 +360,7 @@ def test_the_mean_is_the_mean_of_the_demonstrations(rng):
     """And the doubt that is not noise is their standard deviation; for movements that the basis can describe."""
     phases = np.linspace(0, 1, 60)
     clean = [Polynomial(6)(phases) @ rng.standard_normal((7, 4)) for _ in range(5)]
-    model = inphase.fit(of([2 * phases] * 5, clean), basis=Polynomial(6))
+    model = taught(of([2 * phases] * 5, clean), basis=Polynomial(6))
     assert_allclose(model.predict(phases), np.mean(clean, axis=0), atol=1e-4)
     noise_var = model.scaling.unscale_var(model.noise.var)
     std = np.sqrt(np.maximum(model.distribution(phases)[1] ** 2 - noise_var, 0))
@@ -370,7 +370,7 @@ def test_the_mean_is_the_mean_of_the_demonstrations(rng):
 def test_the_spread_is_the_standard_deviation_of_all_readings(rng):
     demos = holes(rng)
     readings = np.concatenate([d.values for d in demos])
-    for i, spread in enumerate(inphase.fit(demos).spread):
+    for i, spread in enumerate(taught(demos).spread):
         assert_allclose(spread, np.std(readings[~np.isnan(readings[:, i]), i]))
 
 
@@ -387,7 +387,7 @@ def test_the_spread_of_an_angle_does_not_know_where_it_wraps(rng):
         ]
         names = ["arm", *(f"hand_q{axis}" for axis in "xyzw")]
         demos = inphase.Dataset.from_arrays([times] * 4, values, names, ["grip"], kinds={"arm": "angle"})
-        spreads.append(inphase.fit(demos).spread)
+        spreads.append(taught(demos).spread)
     assert_allclose(spreads[0][0], np.std(angles))
     assert_allclose(spreads[1], spreads[0], rtol=1e-9)
 
@@ -398,9 +398,9 @@ def test_the_spread_of_an_angle_does_not_know_where_it_wraps(rng):
 def test_the_unit_of_a_channel_does_not_matter(demos):
     factors, offsets = np.array([1000.0, -2.0, 0.01, 180 / np.pi]), np.array([0.0, 5.0, -300.0, 90.0])
     # Polynomials can be constant: what is called zero, and which end is up, is nothing to them.
-    model = inphase.fit(demos, basis=Polynomial(7))
+    model = taught(demos, basis=Polynomial(7))
     turned = of([d.times for d in demos], [d.values * factors + offsets for d in demos])
-    other = inphase.fit(turned, basis=Polynomial(7))
+    other = taught(turned, basis=Polynomial(7))
     at = np.linspace(0, 1, 11)
     (mean, std), (moved, wider) = model.distribution(at), other.distribution(at)
     assert_allclose((moved - offsets) / factors, mean, atol=1e-4)
@@ -416,7 +416,7 @@ def test_the_unit_of_time_does_not_matter(order, rng):
     phases = []
     for unit, origin in ((1.0, 0.0), (1000.0, 3e4)):
         clocks = of([unit * d.times + origin for d in demos], [d.values for d in demos])
-        model = inphase.fit(clocks.without(4), phase=inphase.learn_phase(clocks.without(4), order=order))
+        model = taught(clocks.without(4), phase=inphase.learn_phase(clocks.without(4), order=order))
         session = model.session(filter="bip")
         seen = zip(unit * live.times + origin, live.values[:, :2], strict=True)
         phases.append([(e.phase, e.phase_std) for e in (session.observe(t, y) for t, y in seen)])
@@ -427,7 +427,7 @@ def test_channels_of_a_group_are_scaled_together(rng):
     demos = dataset(rng, count=4)
     names = ["hand_x", "hand_y"], ["tool_x", "turn"]
     data = inphase.Dataset.from_arrays([d.times for d in demos], [d.values for d in demos], *names)
-    scaling = inphase.fit(data).scaling
+    scaling = taught(data).scaling
     everything = np.concatenate([d.values for d in demos])
     assert_array_equal(scaling.low[:2], everything[:, :2].min(axis=0))
     assert_allclose(scaling.span[:2], [np.ptp(everything[:, :2], axis=0).max()] * 2)
@@ -442,7 +442,7 @@ def test_a_channel_that_some_never_saw_costs_no_trust(rng):
     for curve in values[:6]:
         curve[:, 1] = np.nan
     trusts = [
-        inphase.fit(inphase.Dataset.from_arrays([times] * len(part), part, ["hand"], ["robot"])).prior.trust
+        taught(inphase.Dataset.from_arrays([times] * len(part), part, ["hand"], ["robot"])).prior.trust
         for part in (values, values[6:])
     ]
     assert trusts == pytest.approx([1.0, 1.0], abs=0.05)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from interactions import dataset
+from interactions import dataset, taught
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 from scipy.stats import norm
@@ -182,7 +182,7 @@ def demos() -> inphase.Dataset:
 
 @pytest.fixture(scope="module")
 def model(demos: inphase.Dataset) -> inphase.Model:
-    return inphase.fit(demos.without(-1))
+    return taught(demos.without(-1))
 
 
 def test_a_replay_is_a_session_that_is_shown_the_partner_alone(demos, model):

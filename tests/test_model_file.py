@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from interactions import chance_model, dataset, phase_model, shapes_unchecked, waves
+from interactions import chance_model, dataset, phase_model, shapes_unchecked, taught, waves
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
@@ -70,21 +70,21 @@ def cycles(rng: np.random.Generator) -> inphase.Dataset:
 def with_order(order: int) -> Callable[[np.random.Generator], inphase.Model]:
     def make(rng: np.random.Generator) -> inphase.Model:
         demos = dataset(rng, count=4)
-        return inphase.fit(demos, phase=inphase.learn_phase(demos, order=order))
+        return taught(demos, phase=inphase.learn_phase(demos, order=order))
 
     return make
 
 
 def periodic(rng: np.random.Generator) -> inphase.Model:
     demos = cycles(rng)
-    return inphase.fit(demos, basis=Periodic(7, 0.2), phase=inphase.learn_phase(demos, periodic=True))
+    return taught(demos, basis=Periodic(7, 0.2), phase=inphase.learn_phase(demos, periodic=True))
 
 
 MODELS: dict[str, Callable[[np.random.Generator], inphase.Model]] = {
     "tiny": lambda rng: tiny(),
-    "linear": lambda rng: inphase.fit(dataset(rng)),
-    "angle and quaternion": lambda rng: inphase.fit(turning(rng)),
-    "mixed bases": lambda rng: inphase.fit(
+    "linear": lambda rng: taught(dataset(rng)),
+    "angle and quaternion": lambda rng: taught(turning(rng)),
+    "mixed bases": lambda rng: taught(
         dataset(rng), basis={"reach": Sigmoid(8), "lift": Gaussian(9, 0.3), "grip": Polynomial(5)}
     ),
     "periodic": periodic,
@@ -550,14 +550,14 @@ def test_nothing_half_written(failure, rng, tmp_path, monkeypatch):
     monkeypatch.setattr(Path, "write_bytes", half)
     for target in (path, tmp_path / "new.inphase"):
         with pytest.raises(type(failure)):
-            inphase.fit(dataset(rng, count=3)).save(target)
+            taught(dataset(rng, count=3)).save(target)
     assert [p.name for p in tmp_path.iterdir()] == ["model.inphase"]
     assert path.read_bytes() == before
 
 
 def test_saving_replaces_the_old_file(rng, tmp_path):
     path = tmp_path / "model.inphase"
-    inphase.fit(dataset(rng, count=3)).save(path)
+    taught(dataset(rng, count=3)).save(path)
     tiny().save(path)
     assert_same_model(inphase.Model.load(path), tiny())
     assert [p.name for p in tmp_path.iterdir()] == ["model.inphase"]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from interactions import dataset
+from interactions import dataset, taught
 from matplotlib.figure import Figure
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -25,7 +25,7 @@ LABELS = {
 
 def played(demos: inphase.Dataset, title: str = "the last") -> ReplayPanel:
     """A panel of the last demonstration, followed by a model of the others."""
-    model = inphase.fit(demos.without(-1))
+    model = taught(demos.without(-1))
     return panel(title, model, demos[-1], replay(model, demos[-1], filter="bip"))
 
 

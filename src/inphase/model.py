@@ -15,10 +15,13 @@ from inphase.arrays import freeze, frozen
 from inphase.basis.layout import Layout
 from inphase.channels import Channel, Role, check_channels
 from inphase.errors import OptionError, listing
+from inphase.evidence import Evidence
 from inphase.noise import Noise
 from inphase.phase import PhaseModel
 from inphase.preprocess.coordinates import Coordinates
 from inphase.preprocess.scaling import Scaling
+from inphase.reflex import Reflex
+from inphase.tempo import Tempo
 from inphase.weight_prior import WeightPrior
 
 if TYPE_CHECKING:
@@ -30,8 +33,11 @@ class Model:
     """How two partners move together, learned from demonstrations.
 
     The data flow: channels (D) → `coordinates` → features (F) → `scaling` → `layout` → basis weights (B), believed to
-    be drawn from `prior`, read with `noise`, at a phase that moves by `phase`. spread: (D,) the standard deviation of
-    every channel over the demonstrations, in its unit. Raises OptionError where the parts do not fit each other.
+    be drawn from `prior`, read with `noise`, at a phase that moves by `phase`; `tempo` says how a partner's may differ,
+    `reflex` what was just seen says of the controlled features at once. spread: (D,) the standard deviation of every
+    channel over the demonstrations, in its unit. band: what the standard deviation of a response is multiplied by, so
+    that held-out demonstrations lie in it as often as it says. evidence: what the choices were made by.
+    Raises OptionError where the parts do not fit each other.
     """
 
     channels: tuple[Channel, ...]
@@ -43,6 +49,10 @@ class Model:
     phase: PhaseModel
     spread: Float[np.ndarray, " D"]
     provenance: Mapping[str, str] = field(default_factory=dict)
+    tempo: Tempo = field(default_factory=Tempo)
+    reflex: Reflex | None = None
+    band: float = 1.0
+    evidence: Evidence | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "channels", tuple(self.channels))
@@ -64,6 +74,16 @@ class Model:
             raise OptionError(f"expected observed and controlled channels, got {self.observed} and {self.controlled}")
         if not (np.isfinite(self.spread) & (self.spread > 0)).all():
             raise OptionError(f"expected a positive, finite spread of every channel, got {self.spread}")
+        if not 0 < self.band < np.inf:
+            raise OptionError(f"expected a finite band > 0, got {self.band}")
+        if self.reflex is not None:
+            shown = sum(self.channels[of[0]].role is Role.OBSERVED for of in self.coordinates.channel_of)
+            numbers = len(self.reflex.lags) * shown + features - shown
+            if (self.reflex.observed, len(self.reflex.mean)) != (shown, numbers):
+                raise OptionError(
+                    f"reflex: expected {shown} observed features and {numbers} numbers, "
+                    f"got {self.reflex.observed} and {len(self.reflex.mean)}"
+                )
         if self.phase.periodic != self.layout.periodic:
             raise OptionError(
                 f"expected phase and basis to be both periodic or both not, got phase.periodic={self.phase.periodic} "

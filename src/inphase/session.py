@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
 from inphase.channels import match
@@ -14,6 +14,7 @@ from inphase.errors import ObservationError, OptionError, listing
 from inphase.filters import RECOMMENDED, Belief, Course, StepInfo, make
 from inphase.model import Model
 from inphase.observation import NOTHING, Observation
+from inphase.reflex import Memory
 from inphase.result import Estimate, Response, Status
 
 FAR = 2.0  # ranges beyond all that was demonstrated: no reading of this partner
@@ -22,6 +23,7 @@ UNLIKE_ABOVE = 4.0  # squared distance of a reading from what is believed of it,
 UNLIKE_WITHIN = 0.05  # of a typical interaction, the time constant of that average
 NOW = Course(np.ones(1), np.zeros(1))
 FINISHED_AT, AGAIN_BELOW = 0.99, 0.95  # phases where the end is told and taken back: no flicker in between
+PACE = (0.3, 4.0)  # of the typical tempo: between these, noise lasts as long as the interaction goes slowly
 SLOWEST = 0.05  # of the typical tempo: a response to a partner who stands still must end some time
 
 
@@ -38,6 +40,7 @@ class Session:
         self._seed = seed
         self._index = {name: i for i, name in enumerate(model.names)}
         self._typical_duration = 1.0 / model.phase.nominal_velocity
+        self._shown = model.coordinates.features_of(range(len(model.observed)))
         self.reset()
 
     def __repr__(self) -> str:
@@ -51,6 +54,7 @@ class Session:
         self._time: float | None = None
         self._last_seen = np.full(self.model.coordinates.count, -np.inf)
         self._last_sight: float | None = None
+        self._memory = Memory.empty(len(self._shown))
         self._misfit = 1.0
         self._finished = False
         self._refused = False
@@ -85,6 +89,7 @@ class Session:
         used = observation if info.healthy else NOTHING
         self._belief, self._time = belief, time
         self._last_seen[used.features] = time
+        self._remember(used)
         if self._last_sight is None or len(used):
             self._last_sight = time
         return self._estimate(used, info, dt)
@@ -109,9 +114,6 @@ class Session:
         columns = match(model.controlled if channels is None else channels, model.names)
         features = model.coordinates.features_of(columns)
         mean, var = np.zeros((samples, model.coordinates.count)), np.zeros((samples, model.coordinates.count))
-        mean[:, features], var[:, features] = self._belief.trajectory(course, features)
-        var[:, features] += model.noise.var[features]
-        mean, var = model.to_channels(mean, var)
         phase, velocity = self._belief.phase_mean[0], self._velocity()[0]
         phases = course.share * phase + course.offset
         phases = phases if model.phase.periodic else np.clip(phases, 0.0, 1.0)
@@ -119,6 +121,10 @@ class Session:
         if model.phase.periodic:
             ahead += max(np.ceil(phase - phases[0]), 0.0)  # a phase that has passed comes again in the next cycle
         duration = ahead / max(velocity, SLOWEST * model.phase.nominal_velocity)
+        mean[:, features], var[:, features] = self._belief.trajectory(course, features)
+        var[:, features] += model.noise.var[features]
+        mean += self._reflex(course, duration, features, mean[0])
+        mean, var = model.to_channels(mean, model.band**2 * var)
         return Response(
             times=(self._time or 0.0) + duration,
             phases=phases % 1.0 if model.phase.periodic else phases,
@@ -156,7 +162,9 @@ class Session:
             phase = model.phase.confine(mean[:1] + self._velocity()[0] * dt)
             near = model.scaling.unscale(model.layout.predict(phase, self._belief.weights_mean)[0])
             values = model.coordinates.sample(sample, near)
-        noise_var = model.noise.at(time - self._last_seen)
+        # A residual belongs to a place in the movement: who moves slowly stays on one side of the others for longer.
+        pace = float(np.clip(self._velocity()[0] / model.phase.nominal_velocity, *PACE))
+        noise_var = model.noise.at((time - self._last_seen) * pace)
         scaled = model.scaling.scale(values)
         # One reading in the wrong unit would move the belief for good. The gate is one of values, not of surprise: a
         # filter that is lost has to hear what surprises it.
@@ -164,6 +172,40 @@ class Session:
         self._refused = bool((np.isfinite(scaled) & ~near).any())
         seen = np.flatnonzero(near & np.isfinite(noise_var))
         return Observation(seen, scaled[seen], noise_var[seen])
+
+    def _remember(self, used: Observation) -> None:
+        reflex, shown = self.model.reflex, used.features < len(self._shown)
+        if reflex is not None and shown.any() and self._time is not None:
+            seen, values = used.features[shown], used.values[shown]
+            self._memory = self._memory.after(self._time, seen, values, reflex.memory)
+
+    def _reflex(
+        self,
+        course: Course,
+        ahead: Float[np.ndarray, " S"],
+        features: Int[np.ndarray, " M"],
+        first: Float[np.ndarray, " F"],
+    ) -> Float[np.ndarray, "S F"]:
+        """How much the reflex moves the response: its share now, less and less the further ahead.
+
+        What has not been seen for a while, or is seen itself, it leaves alone.
+        """
+        moved = np.zeros((len(ahead), len(first)))
+        reflex, model, memory = self.model.reflex, self.model, self._memory
+        if reflex is None or reflex.share == 0 or self._time is None or not len(memory.times):
+            return moved
+        age = self._time - memory.last_seen
+        seen = age <= reflex.memory
+        own = features[(features >= len(self._shown)) & (self._time - self._last_seen[features] > reflex.memory)]
+        if not seen.any() or not len(own):
+            return moved
+        at_once = course.share[0] == 1 and course.offset[0] == 0
+        now = first[own] if at_once else self._belief.trajectory(NOW, own)[0][0]
+        answer = reflex.answer(memory.at(self._time - reflex.lags), seen, reflex.gains(seen))
+        share = reflex.share * np.exp(-age.min() / reflex.fade)
+        lasting = np.maximum(model.noise.correlation_time[own], np.finfo(float).tiny)
+        moved[:, own] = np.exp(-np.abs(ahead)[:, None] / lasting) * share * (answer[own - len(self._shown)] - now)
+        return moved
 
     def _course(self, lookahead: float, start: float | None, samples: int) -> Course:
         if not (isinstance(samples, (int, np.integer)) and samples >= 1):

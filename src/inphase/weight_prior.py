@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,26 +10,30 @@ import numpy as np
 from jaxtyping import Float
 
 from inphase.arrays import freeze, frozen
-from inphase.errors import OptionError
+from inphase.errors import OptionError, listing
 
 
 @dataclass(frozen=True, eq=False)
 class WeightPrior:
     """The demonstrations' weights, and the Gaussian made of them.
 
-    samples: (N, B) one row a demonstration. shrinkage: 0 … 1, how much of the covariance between weights is taken for
-    chance; the variances stay. trust: 0 … 1, by how much the correlation between the observed partner, whose are the
-    first `partner` weights, and the controlled one is believed; at 0 the response is the mean movement. Raises
-    OptionError for fewer than two demonstrations, or numbers outside their range.
+    samples: (N, B) one row a demonstration. shrinkage: 0 … 1, how much of the covariance between features is taken for
+    chance; that of the weights of one feature, whose movement is smooth, stays whole. blocks: how many weights each
+    feature has, in their order; empty where that is not known: then each weight stands for itself, and all but the
+    variances shrinks. trust: 0 … 1, by how much the correlation between the observed partner, whose are the first
+    `partner` weights, and the controlled one is believed; at 0 the response is the mean movement. Raises OptionError
+    for fewer than two demonstrations, blocks that are not B weights together, or numbers outside their range.
     """
 
     samples: Float[np.ndarray, "N B"]
     shrinkage: float = 0.0
     trust: float = 1.0
     partner: int = 0
+    blocks: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         freeze(self, samples=self.samples)
+        object.__setattr__(self, "blocks", tuple(self.blocks))
         if self.samples.ndim != 2 or len(self.samples) < 2 or not np.isfinite(self.samples).all():
             raise OptionError(f"expected finite weights (N, B) of at least 2 demonstrations, got {self.samples.shape}")
         if not 0 <= self.shrinkage <= 1:
@@ -37,6 +42,7 @@ class WeightPrior:
             raise OptionError(f"expected a trust between 0 and 1, got {self.trust}")
         if not 0 <= self.partner <= self.samples.shape[1]:
             raise OptionError(f"expected partner from 0 to {self.samples.shape[1]} weights, got {self.partner}")
+        check_blocks(self.blocks, self.samples.shape[1])
 
     @cached_property
     def mean(self) -> Float[np.ndarray, " B"]:
@@ -47,22 +53,32 @@ class WeightPrior:
     def factor(self) -> Float[np.ndarray, "R B"]:
         """(R, B) directions with Σ_ww = factorᵀ factor (Eq. 2.14): a weight vector is mean + c @ factor, c ~ N(0, I).
 
-        Without shrinkage R < N, twice that where trust is lacking: the exact filters work in as few dimensions.
+        Without shrinkage R < N, twice that where trust is lacking: the exact filters work in as few dimensions. With it
+        every feature has as many of its own.
         """
-        spread = (self.samples - self.mean) / np.sqrt(len(self.samples) - 1)
-        rows = [np.sqrt(1 - self.shrinkage) * spread] if self.shrinkage < 1 else []
+        rows = self._spread
         if self.shrinkage > 0:
-            rows.append(np.diag(np.sqrt(self.shrinkage * (spread**2).sum(0))))
+            rows = np.concatenate([np.sqrt(1 - self.shrinkage) * rows, np.sqrt(self.shrinkage) * self._apart])
         if self.trust < 1:
-            shared, alone = np.concatenate(rows), np.concatenate(rows)
+            both = rows[:, : self.partner].any(1) & rows[:, self.partner :].any(1)
+            shared, alone = rows[both], rows[both]
             shared[:, self.partner :] *= self.trust
             alone[:, : self.partner] = 0.0
-            rows = [shared, np.sqrt(1 - self.trust**2) * alone]
-        # The directions of the sample covariance sum to zero and are one too many: rotate that one away.
-        _, size, directions = np.linalg.svd(np.concatenate(rows), full_matrices=False)
-        kept = size > 1e-10 * max(size[0], np.finfo(float).tiny)
-        kept[0] = True  # demonstrations that are all the same leave one direction of no length
-        return frozen(size[kept, None] * directions[kept])
+            rows = np.concatenate([rows[~both], shared, np.sqrt(1 - self.trust**2) * alone])
+        return frozen(_reduced(rows))
+
+    @cached_property
+    def _spread(self) -> Float[np.ndarray, "N B"]:
+        """(N, B) the demonstrations around their mean: rows whose square is the sample covariance."""
+        return frozen((self.samples - self.mean) / np.sqrt(len(self.samples) - 1))
+
+    @cached_property
+    def _apart(self) -> Float[np.ndarray, "R B"]:
+        """(R, B) rows of one feature each, whose square is the sample covariance without what is between features."""
+        from scipy.linalg import block_diag
+
+        ends = np.cumsum(self.blocks or (1,) * self.samples.shape[1])[:-1]
+        return frozen(block_diag(*(_reduced(part) for part in np.split(self._spread, ends, axis=1))))
 
     @property
     def cov(self) -> Float[np.ndarray, "B B"]:
@@ -80,9 +96,35 @@ class WeightPrior:
         """
         number = len(self.samples)
         order = np.concatenate([np.tile(np.arange(number), count // number), rng.permutation(number)[: count % number]])
-        drawn = self.samples[order]
-        if self.trust < 1:
-            off, other = drawn - self.mean, drawn[rng.permutation(count)] - self.mean
-            mixed = self.mean + self.trust * off + np.sqrt(1 - self.trust**2) * other
-            drawn[:, self.partner :] = mixed[:, self.partner :]
-        return np.asarray(drawn)
+        return self._as_trusted(self.samples[order], rng)
+
+    def as_believed(self, drawn: Float[np.ndarray, "E B"], rng: np.random.Generator) -> Float[np.ndarray, "E B"]:
+        """Draws from another density with the demonstrations' covariance, as correlated as is believed: like `cov`."""
+        if self.shrinkage > 0:
+            chance = rng.standard_normal((len(drawn), len(self._apart))) @ self._apart
+            off = np.sqrt(1 - self.shrinkage) * (drawn - self.mean) + np.sqrt(self.shrinkage) * chance
+            drawn = self.mean + off
+        return self._as_trusted(drawn, rng)
+
+    def _as_trusted(self, drawn: Float[np.ndarray, "E B"], rng: np.random.Generator) -> Float[np.ndarray, "E B"]:
+        if self.trust == 1:
+            return drawn
+        off, other = drawn - self.mean, drawn[rng.permutation(len(drawn))] - self.mean
+        mixed = self.mean + self.trust * off + np.sqrt(1 - self.trust**2) * other
+        return np.concatenate([drawn[:, : self.partner], mixed[:, self.partner :]], axis=1)
+
+
+def check_blocks(blocks: Sequence[int], size: int) -> None:
+    """Raise OptionError unless the blocks are counts of weights, `size` together, or none at all."""
+    counts = all(isinstance(count, (int, np.integer)) and count > 0 for count in blocks)
+    if blocks and not (counts and sum(blocks) == size):
+        raise OptionError(f"expected blocks of {size} weights together, got {listing(blocks)}")
+
+
+def _reduced(rows: Float[np.ndarray, "N B"]) -> Float[np.ndarray, "R B"]:
+    """As few rows as have the same square: orthogonal ones, the longest first."""
+    # The directions of the sample covariance sum to zero and are one too many: rotate that one away.
+    _, size, directions = np.linalg.svd(rows, full_matrices=False)
+    kept = size > 1e-10 * max(size[0], np.finfo(float).tiny)
+    kept[0] = True  # demonstrations that are all the same leave one direction of no length
+    return np.asarray(size[kept, None] * directions[kept])

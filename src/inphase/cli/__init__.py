@@ -34,6 +34,7 @@ def _run(arguments: Sequence[str]) -> int:
     from threadpoolctl import threadpool_limits
 
     from inphase.cli.demo import demo
+    from inphase.cli.evaluate import evaluate
     from inphase.cli.fit import fit
     from inphase.cli.inspect import inspect
     from inphase.cli.replay import replay
@@ -45,6 +46,7 @@ def _run(arguments: Sequence[str]) -> int:
         "fit": fit,
         "inspect": inspect,
         "replay": replay,
+        "evaluate": evaluate,
     }
     # The products of a filter are small: two threads make each slower, many times so on a busy machine.
     with threadpool_limits(limits=1):

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from inphase.evaluation.replay import MARKS, Replay, by_the_clock
+from inphase.evaluation.metrics import MARKS
+from inphase.evaluation.replay import Replay, by_the_clock
 from inphase.model import Model
 from inphase.trajectory import Demonstration
 

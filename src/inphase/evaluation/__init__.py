@@ -1,6 +1,29 @@
 """Evaluation: how well a model follows interactions it has not seen."""
 
-from inphase.evaluation.metrics import Scores, difference
+from inphase.evaluation.baselines import BASELINES
+from inphase.evaluation.conditions import CONDITIONS, warp
+from inphase.evaluation.metrics import Errors, Scores, difference
+from inphase.evaluation.predictor import Filtered, Learner, Predictor, play
+from inphase.evaluation.protocol import evaluate
 from inphase.evaluation.replay import Replay, replay
+from inphase.evaluation.results import METRICS, Evaluation, Figure, Row
 
-__all__ = ["Replay", "Scores", "difference", "replay"]
+__all__ = [
+    "BASELINES",
+    "CONDITIONS",
+    "METRICS",
+    "Errors",
+    "Evaluation",
+    "Figure",
+    "Filtered",
+    "Learner",
+    "Predictor",
+    "Replay",
+    "Row",
+    "Scores",
+    "difference",
+    "evaluate",
+    "play",
+    "replay",
+    "warp",
+]

@@ -10,13 +10,11 @@ import numpy as np
 from jaxtyping import Float
 
 from inphase.errors import DataError, listing
-from inphase.evaluation.metrics import Scores, difference
+from inphase.evaluation.metrics import MARKS, Errors, Scores, difference
 from inphase.model import Model
 from inphase.result import Estimate, Response
 from inphase.session import Session
 from inphase.trajectory import Dataset, Demonstration
-
-MARKS = (0.25, 0.5, 0.75)  # of the episode, where the final pose is compared
 
 
 @dataclass(frozen=True)
@@ -43,19 +41,23 @@ class Replay:
     spread: Float[np.ndarray, " Dc"]
 
     @property
+    def errors(self) -> Errors:
+        """Of the controlled channels."""
+        return Errors(
+            now=np.array([m.now_error for m in self.moments]),
+            std=np.array([m.response.std[0] for m in self.moments]),
+            end=np.array([m.end_error for m in self.moments]),
+            spread=self.spread,
+        )
+
+    @property
     def now(self) -> Scores:
         """The scores of the controlled channels at every sample."""
-        return Scores.of(
-            np.array([m.now_error for m in self.moments]),
-            np.array([m.response.std[0] for m in self.moments]),
-            self.spread,
-        )
+        return self.errors.scores
 
     def final_pose(self, share: float) -> float:
         """nMSE of the final pose, as predicted after that share of the episode."""
-        moment = self.moments[min(int(share * len(self.moments)), len(self.moments) - 1)]
-        error = moment.end_error / self.spread
-        return float(np.mean(error[np.isfinite(error)] ** 2)) if np.isfinite(error).any() else float("nan")
+        return self.errors.final_pose(share)
 
     @property
     def log_likelihood(self) -> float:

@@ -10,10 +10,18 @@ from inphase.filters.belief import Belief, Course, EnsembleBelief, GaussianBelie
 from inphase.filters.bip import Bip
 from inphase.filters.ebip import Ebip
 from inphase.filters.filter import Filter, StepInfo
+from inphase.filters.particle import Particle, WeightedBelief
+from inphase.filters.promp import Promp, PrompBelief
 from inphase.filters.rbpf import ParticleBelief, Rbpf
 from inphase.model import Model
 
-FILTERS: dict[str, type[Bip] | type[Ebip] | type[Rbpf]] = {"bip": Bip, "ebip": Ebip, "rbpf": Rbpf}
+FILTERS: dict[str, type[Bip | Ebip | Particle | Promp | Rbpf]] = {
+    "bip": Bip,
+    "ebip": Ebip,
+    "particle": Particle,
+    "promp": Promp,
+    "rbpf": Rbpf,
+}
 
 RECOMMENDED = "rbpf"  # for whoever names none: docs/filters.md says why
 
@@ -27,9 +35,13 @@ __all__ = [
     "EnsembleBelief",
     "Filter",
     "GaussianBelief",
+    "Particle",
     "ParticleBelief",
+    "Promp",
+    "PrompBelief",
     "Rbpf",
     "StepInfo",
+    "WeightedBelief",
     "make",
 ]
 

@@ -148,7 +148,7 @@ class Rbpf:
             self.model,
             self.directions,
             np.zeros(self.particles),
-            begin(self.model.phase, self.particles, rng),
+            begin(self.model.phase, self.model.tempo, self.particles, rng),
             np.zeros((self.particles, size)),
             np.tile(np.eye(size), (self.particles, 1, 1)),
         )
@@ -157,7 +157,7 @@ class Rbpf:
         """The particles move on; nothing else does."""
         if dt == 0:
             return belief
-        motion = advance(belief.motion, self.model.phase, dt, rng)
+        motion = advance(belief.motion, self.model.phase, self.model.tempo, dt, rng)
         return ParticleBelief(self.model, belief.directions, belief.log_weights, motion, belief.means, belief.covs)
 
     def step(

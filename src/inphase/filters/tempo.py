@@ -8,14 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from inphase.phase import PhaseModel
+from inphase.tempo import Tempo
 
-# Shares and spreads of the logarithm of the tempo, and rates per typical interaction.
-USUAL_SHARE, USUAL_STD = 0.7, 0.05  # interactions at the demonstrations' tempo, give or take 5 %; the others …
-OTHER_STD = 0.5  # … at any: half and double lie at 1.4 standard deviations
-NEW_TEMPO_RATE = 0.5  # a person who changes the tempo for good
-STEADY_SHARE, STEADY_STD = 0.9, 0.05  # stretches at one's tempo; in the others it is anything for a moment …
-STRETCH_RATE = 7.0  # … with so many stretches
-STOP_RATE, GO_RATE = 0.5, 7.0  # a pause now and then, over after a seventh of an interaction
 LONGEST_STEP = 0.02  # of a typical interaction: a long gap is crossed in several
 MOST_STEPS = 200  # after four whole interactions out of sight nothing is known any more
 PHASE_JITTER = 0.005  # after a typical interaction, so that particles that were copied part
@@ -47,45 +41,51 @@ class Motion:
         return np.where(self.waiting, 0.0, phase.nominal_velocity * np.exp(self.own + self.momentary))
 
 
-def begin(phase: PhaseModel, count: int, rng: np.random.Generator) -> Motion:
+def begin(phase: PhaseModel, tempo: Tempo, count: int, rng: np.random.Generator) -> Motion:
     """`count` particles at the start of an interaction."""
     start = phase.mean[0] + np.sqrt(phase.cov[0, 0]) * rng.standard_normal(count)
     return Motion(
         phase.confine(start),
-        _mixed(count, USUAL_SHARE, USUAL_STD, rng),
-        _mixed(count, STEADY_SHARE, STEADY_STD, rng),
+        _mixed(count, tempo.usual, tempo.usual_std, tempo.other_std, rng),
+        _mixed(count, tempo.steady, tempo.momentary_std, tempo.other_std, rng),
         np.zeros(count, dtype=bool),
     )
 
 
-def advance(motion: Motion, phase: PhaseModel, dt: float, rng: np.random.Generator) -> Motion:
+def advance(motion: Motion, phase: PhaseModel, tempo: Tempo, dt: float, rng: np.random.Generator) -> Motion:
     """The particles dt [s] later.
 
     Tempo is constant but for stretches that begin at random, so that how often samples come makes no difference.
     """
     steps = min(int(np.ceil(phase.nominal_velocity * dt / LONGEST_STEP)), MOST_STEPS)
     for _ in range(steps):
-        motion = _step(motion, phase, dt / steps, rng)
+        motion = _step(motion, phase, tempo, dt / steps, rng)
     return motion
 
 
-def _step(motion: Motion, phase: PhaseModel, dt: float, rng: np.random.Generator) -> Motion:
+def _step(motion: Motion, phase: PhaseModel, tempo: Tempo, dt: float, rng: np.random.Generator) -> Motion:
     count, typical = len(motion.phase), phase.nominal_velocity * dt
-    begins, changes = (rng.random(count) < -np.expm1(-rate * typical) for rate in (STRETCH_RATE, NEW_TEMPO_RATE))
-    turn = rng.random(count)
+
+    def happens(rate: float) -> Bool[np.ndarray, " P"]:
+        return np.asarray(rng.random(count) < -np.expm1(-rate * typical))
+
+    changes, begins = happens(tempo.change_rate), happens(tempo.stretch_rate)
+    stops, goes = happens(tempo.stop_rate), happens(tempo.go_rate)
+    own = _mixed(count, tempo.usual, tempo.usual_std, tempo.other_std, rng)
+    momentary = _mixed(count, tempo.steady, tempo.momentary_std, tempo.other_std, rng)
     moved = replace(
         motion,
-        own=np.where(changes, _mixed(count, USUAL_SHARE, USUAL_STD, rng), motion.own),
-        momentary=np.where(begins, _mixed(count, STEADY_SHARE, STEADY_STD, rng), motion.momentary),
-        waiting=np.where(motion.waiting, turn > -np.expm1(-GO_RATE * typical), turn < -np.expm1(-STOP_RATE * typical)),
+        own=np.where(changes, own, motion.own),
+        momentary=np.where(begins, momentary, motion.momentary),
+        waiting=np.where(motion.waiting, ~goes, stops),
     )
     jitter = PHASE_JITTER * np.sqrt(typical) * rng.standard_normal(count)
     return replace(moved, phase=phase.confine(motion.phase + moved.tempo(phase) * dt + jitter))
 
 
-def _mixed(count: int, share: float, std: float, rng: np.random.Generator) -> Float[np.ndarray, " P"]:
+def _mixed(count: int, share: float, std: float, other_std: float, rng: np.random.Generator) -> Float[np.ndarray, " P"]:
     """Logarithms of tempo: a share of them narrow, the others wide; stratified, so that few particles cover both."""
     from scipy.special import ndtri
 
     normal = ndtri((rng.permutation(count) + rng.random(count)) / count)
-    return np.asarray(np.where(rng.random(count) < share, std, OTHER_STD) * normal)
+    return np.asarray(np.where(rng.random(count) < share, std, other_std) * normal)

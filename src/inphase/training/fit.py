@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
@@ -16,8 +17,13 @@ from inphase.noise import Noise
 from inphase.phase import PhaseModel
 from inphase.preprocess.coordinates import Coordinates
 from inphase.preprocess.scaling import Scaling
+from inphase.tempo import Tempo
+from inphase.training.calibrate import FEWEST
+from inphase.training.calibrate import calibrate as calibrated
 from inphase.training.discrepancy import leave_one_out
 from inphase.training.noise import both, regression_noise
+from inphase.training.reflex import learn_reflex
+from inphase.training.shrinkage import intensity
 from inphase.training.tempo import learn_phase
 from inphase.trajectory import Dataset
 from inphase.weight_prior import WeightPrior
@@ -34,18 +40,62 @@ def fit(
     prior: WeightPrior | None = None,
     noise: Noise | None = None,
     phase: PhaseModel | None = None,
+    tempo: Tempo | None = None,
+    shrinkage: str | float | None = None,
+    calibrate: bool = True,
+    jobs: int = 1,
+    progress: Callable[[float], None] | None = None,
 ) -> Model:
     """Learn how two partners move together.
 
     Everything is learned from the data set but what is named: a basis for all channels or by channel name or pattern
     (what is left out keeps the default), the scaling of the features, the prior over weights, the observation noise in
     scaled units (else that of the regression, Eq. 2.15, and that of leaving each demonstration out), the phase prior
-    (`inphase.learn_phase` makes one of another order, or periodic).
+    (`inphase.learn_phase` makes one of another order, or periodic), how a partner's tempo may differ, and the shrinkage
+    of the prior ("ledoit-wolf", "oas", or 0 … 1). Where there are four demonstrations or more, the rest is calibrated:
+    demonstrations are held out and played, which takes up to a minute; `calibrate=False` leaves that out. jobs: the
+    processes that play. progress: is told the share that is done.
     Raises DataError for fewer than two demonstrations, no controlled channel, or a channel that never moves;
     ChannelError for a pattern that fits nothing; OptionError for parts that do not fit each other.
     """
     if not isinstance(dataset, Dataset):
         raise DataError(f"expected a Dataset, as inphase.load makes one, got {type(dataset).__name__}")
+
+    def learn(part: Dataset) -> Model:
+        return _learn(part, basis, scaling, prior, noise, phase, tempo, shrinkage)
+
+    model = learn(dataset)
+    if not calibrate or len(dataset) < FEWEST:
+        return model
+    fixed = [
+        name
+        for name, given in (
+            ("noise lasts", noise is not None),
+            ("trust", prior is not None),
+            ("shrinkage", prior is not None or shrinkage is not None),
+            ("usual tempo", tempo is not None),
+        )
+        if given
+    ]
+
+    def learn_fold(part: Dataset) -> Model:
+        # The scale is the whole data set's, so that what is chosen for a part is right for all.
+        return _learn(part, basis, model.scaling, prior, noise, phase, tempo, shrinkage)
+
+    return calibrated(dataset, model, learn_fold, fixed=fixed, jobs=jobs, progress=progress)
+
+
+def _learn(
+    dataset: Dataset,
+    basis: Basis | Mapping[str, Basis] | None,
+    scaling: Scaling | None,
+    prior: WeightPrior | None,
+    noise: Noise | None,
+    phase: PhaseModel | None,
+    tempo: Tempo | None,
+    shrinkage: str | float | None,
+) -> Model:
+    """The model of a data set, without playing anything."""
     _check(dataset)
     phase = phase if phase is not None else learn_phase(dataset)
     values = [demonstration.values for demonstration in dataset]
@@ -65,6 +115,8 @@ def fit(
         left_out = leave_one_out(layout, weights, np.array(shown, dtype=np.float64), duration, seen)
         noise = noise or both(regression_noise(times, residuals(layout, phases, scaled, weights)), left_out.noise)
         prior = prior or WeightPrior(weights, trust=left_out.trust, partner=layout.slices[shown.index(False)].start)
+    if shrinkage is not None:
+        prior = replace(prior, shrinkage=intensity(shrinkage, prior.samples))
     return Model(
         channels=dataset.channels,
         coordinates=coordinates,
@@ -75,6 +127,8 @@ def fit(
         phase=phase,
         spread=_spread(coordinates, features),
         provenance={**dataset.provenance, "demonstrations": str(len(dataset))},
+        tempo=tempo if tempo is not None else Tempo(),
+        reflex=learn_reflex(times, scaled, sum(shown)),
     )
 
 

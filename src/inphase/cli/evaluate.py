@@ -1,0 +1,151 @@
+"""`inphase evaluate`: how well filters follow interactions that they have not seen, by cross-validation."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from inphase.cli.accuracy import LEGEND, accuracy_series, describe_evaluation, print_evaluation
+from inphase.cli.console import Output, counted
+from inphase.cli.reading import AsJson, Columns, Recordings
+from inphase.errors import DataError, OptionError, listing
+from inphase.evaluation import CONDITIONS
+from inphase.evaluation import evaluate as cross_validate
+from inphase.evaluation.protocol import FOLDS
+from inphase.filters import FILTERS, RECOMMENDED
+from inphase.io.atomic import check_target, whole_file
+from inphase.report.accuracy_picture import draw_accuracy
+from inphase.report.replay_picture import check_picture
+from inphase.trajectory import Dataset
+
+FilterNames = Annotated[tuple[str, ...], tyro.conf.arg(metavar=f"{'|'.join(FILTERS)}...")]
+ConditionNames = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME...")]
+File = Annotated[Path | None, tyro.conf.arg(help_behavior_hint="")]
+
+
+def evaluate(
+    data: Recordings,
+    columns: tyro.conf.OmitArgPrefixes[Columns],
+    filters: FilterNames = (RECOMMENDED,),
+    folds: int = FOLDS,
+    conditions: ConditionNames = tuple(CONDITIONS),
+    seed: int = 0,
+    jobs: Annotated[int | None, tyro.conf.arg(help_behavior_hint="")] = None,
+    output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], help_behavior_hint="")] = None,
+    picture: File = None,
+    json_: AsJson = False,
+) -> int:
+    """Say how well filters follow recordings that they have not seen, beside two baselines.
+
+    The baselines are the mean trajectory, played by the clock, and a ridge regression on the partner's last moments.
+
+    Args:
+        data: files, folders or globs of CSV or npz recordings, one episode a file; of several folders each is a task
+        columns: what the columns are
+        filters: how phase and weights are inferred, one or more; none for the baselines alone
+        folds: every so many-th episode is held out at a time
+        conditions: under which held-out episodes are shown: other tempos, a pause, a partner out of sight
+        seed: of the filters' random numbers
+        jobs: processes that work side by side; otherwise one a processor
+        output: write all figures, every episode's too, into this JSON file
+        picture: draw errors and coverage into this file (.png, .svg or .pdf)
+        json_: print all figures as JSON
+    """
+    if picture is not None:
+        check_picture(picture)
+    for path in (output, picture):
+        if path is not None:
+            check_target(path)
+    tasks = _read(data, columns)
+    with _progress(f"evaluating {counted(sum(map(len, tasks.values())), 'episode')}") as progress:
+        evaluation = cross_validate(
+            tasks,
+            filters,
+            folds=folds,
+            conditions=conditions,
+            seed=seed,
+            jobs=_processors() if jobs is None else jobs,
+            progress=progress,
+        )
+    found = {"folds": folds, "seed": seed, **describe_evaluation(evaluation)}
+    console = Output(quiet=json_)
+    print_evaluation(console, evaluation)
+    console.print(LEGEND, style="dim")
+    if output is not None:
+        with whole_file(output) as temporary:
+            temporary.write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        console.print(f"wrote {output}")
+    if picture is not None:
+        title = evaluation.tasks[0] if len(evaluation.tasks) == 1 else f"mean of {len(evaluation.tasks)} tasks"
+        draw_accuracy(picture, title, evaluation.conditions, accuracy_series(evaluation))
+        console.print(f"wrote {picture}")
+    if json_:
+        json.dump(found, sys.stdout, indent=1, allow_nan=False)
+        print()
+    return 0
+
+
+def _read(data: Sequence[str], columns: Columns) -> dict[str, Dataset]:
+    """The tasks by name: every one of several folders, or all recordings together."""
+    folders = [part for part in data if Path(part).is_dir()]
+    if len(data) > 1 and folders and len(folders) < len(data):
+        raise OptionError(
+            f"expected folders, each a task, or files of one task; got as folders {listing(folders)}, "
+            f"and {listing(part for part in data if part not in folders)}"
+        )
+    if len(data) == 1 or not folders:
+        name = Path(data[0]).resolve().name if folders else "recordings"
+        tasks = {name: columns.load(data)}
+    else:
+        tasks = {name: columns.load([part]) for name, part in zip(_names(folders), folders, strict=True)}
+    first = next(iter(tasks))
+    for task, dataset in tasks.items():
+        if not dataset.observed or not dataset.controlled:
+            raise OptionError(
+                f"expected --observed and --controlled, the channels of either partner; got as observed "
+                f"{listing(dataset.observed)}, and as controlled {listing(dataset.controlled)}"
+            )
+        for role in ("observed", "controlled"):
+            expected, got = getattr(tasks[first], role), getattr(dataset, role)
+            if set(expected) != set(got):
+                raise DataError(
+                    f"{task}: expected the {role} channels of {first}, {listing(expected)}; got {listing(got)}"
+                )
+    return tasks
+
+
+def _names(folders: Sequence[str]) -> list[str]:
+    """The names of folders, or their paths where names are equal; raises OptionError for a folder that stands twice."""
+    paths = [Path(folder).resolve() for folder in folders]
+    twice = [str(path) for i, path in enumerate(paths) if path in paths[:i]]
+    if twice:
+        raise OptionError(f"expected every folder once, got twice: {listing(twice)}")
+    names = [path.name for path in paths]
+    return [name if names.count(name) == 1 else folder for name, folder in zip(names, folders, strict=True)]
+
+
+def _processors() -> int:
+    from joblib import cpu_count  # type: ignore[import-untyped]
+
+    return int(cpu_count())
+
+
+@contextmanager
+def _progress(what: str) -> Iterator[Callable[[int, int], None] | None]:
+    """A bar on standard error, if that is a terminal; to be told how much is done."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    console = Output(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    shown = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*shown, console=console, transient=True) as bar:
+        task = bar.add_task(what)
+        yield lambda done, total: bar.update(task, completed=done, total=total)

@@ -1,0 +1,185 @@
+"""Calibration: noise, trust, tempo, shrinkage, reflex and band, chosen by held-out demonstrations.
+
+Every choice starts from what was learned without playing anything, and changes only for a candidate that is better by
+more than its standard error: a handful of demonstrations is easily flattered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from inphase.evidence import Evidence, Trial
+from inphase.metrics import NINETY, Errors
+from inphase.model import Model
+from inphase.noise import Noise
+from inphase.training.rehearsal import CONDITIONS, Rehearsal, by_the_clock, play, rehearsals, relative, scores
+from inphase.training.shrinkage import oas
+from inphase.training.workers import Run, workers
+from inphase.trajectory import Dataset
+
+FEWEST = 4  # demonstrations: without one of three, too little is left to judge by
+INSIDE = 0.9  # of the readings, inside the band of 90 %
+BANDS = (0.3, 3.0)  # nothing that so few demonstrations tell makes a band narrower or wider than that
+
+Change = Callable[[Model], Model]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One way to have a model: `value` in words, and the change that makes a model so."""
+
+    value: str
+    change: Change
+
+
+def _lasting(factor: float) -> Change:
+    def change(model: Model) -> Model:
+        return replace(model, noise=Noise(model.noise.var, factor * model.noise.correlation_time))
+
+    return change
+
+
+def _trust(trust: float) -> Change:
+    return lambda model: replace(model, prior=replace(model.prior, trust=trust))
+
+
+def _usual(usual: float) -> Change:
+    return lambda model: replace(model, tempo=replace(model.tempo, usual=usual))
+
+
+def _shrunk(rule: Callable[[Float[np.ndarray, "N B"]], float]) -> Change:
+    return lambda model: replace(model, prior=replace(model.prior, shrinkage=rule(model.prior.samples)))
+
+
+def _reflex(share: float) -> Change:
+    return lambda model: replace(model, reflex=replace(model.reflex, share=share) if model.reflex else None)
+
+
+def _banded(band: float) -> Change:
+    return lambda model: replace(model, band=band)
+
+
+CHOICES: dict[str, tuple[Candidate, ...]] = {
+    "noise lasts": tuple(Candidate(f"{x:g} times as long", _lasting(x)) for x in (2.0,)),
+    "trust": tuple(Candidate(f"{x:g}", _trust(x)) for x in (0.0, 0.5)),
+    "usual tempo": tuple(Candidate(f"{x:.0%} of interactions", _usual(x)) for x in (0.5, 0.9)),
+    "shrinkage": (Candidate("OAS", _shrunk(oas)),),
+}
+
+
+class Calibration:
+    """The choices so far, and their evidence."""
+
+    def __init__(self, held_out: Sequence[Rehearsal], run: Run, tell: Callable[[], None]):
+        self._held_out, self._run, self._tell = held_out, run, tell
+        self._changes: list[Change] = []
+        self.trials: list[Trial] = []
+        self.errors = self._play(None)
+        self._note("before", "as learned", self.errors, chosen=True)
+
+    def choose(self, choice: str, candidates: Sequence[Candidate]) -> None:
+        """Play every candidate and keep the best, if it is better than what is there by more than chance."""
+        played = [self._play(candidate.change) for candidate in candidates]
+        gains = [self._gain(errors) for errors in played]
+        best = int(np.argmax([mean for mean, _ in gains]))
+        better = gains[best][0] > gains[best][1]
+        self._note(choice, "as it is", self.errors, chosen=not better)
+        for i, (candidate, errors) in enumerate(zip(candidates, played, strict=True)):
+            self._note(choice, candidate.value, errors, chosen=better and i == best)
+        if better:
+            self._changes.append(candidates[best].change)
+            self.errors = played[best]
+
+    def choose_reflex(self) -> None:
+        """The share of the reflex. The answer is linear in it: the filter alone and the reflex alone tell of all."""
+        alone = self._play(_reflex(1.0))
+        off, step = self.errors, [b.now - a.now for a, b in zip(self.errors, alone, strict=True)]
+        weight = [1 / (e.spread**2 * e.now.size) for e in off]
+        toward = -sum(float(np.nansum(e.now * s * w)) for e, s, w in zip(off, step, weight, strict=True))
+        length = sum(float(np.nansum(s**2 * w)) for s, w in zip(step, weight, strict=True))
+        share = float(np.clip(toward / max(length, 1e-300), 0.0, 1.0))
+        mixed = [replace(e, now=e.now + share * s) for e, s in zip(off, step, strict=True)]
+        mean, doubt = self._gain(mixed)
+        better = mean > doubt
+        for value, errors, chosen in (("0", off, not better), (f"{share:.2f}", mixed, better), ("1", alone, False)):
+            self._note("reflex", value, errors, chosen=chosen)
+        self._changes.append(_reflex(share if better else 0.0))
+        self.errors = mixed if better else off
+
+    def choose_band(self) -> None:
+        """As wide as it takes for nine of ten readings to lie inside."""
+        off = np.abs(relative(self.errors))
+        band = float(np.clip(np.quantile(off, INSIDE) / NINETY, *BANDS)) if len(off) else 1.0
+        self._changes.append(_banded(band))
+        self._note("band", f"{band:.2f} times as wide", self.errors, chosen=True, band=band)
+
+    def applied(self, model: Model) -> Model:
+        """A model with all that was chosen."""
+        for change in self._changes:
+            model = change(model)
+        return model
+
+    def _play(self, change: Change | None) -> list[Errors]:
+        tasks = []
+        for rehearsal in self._held_out:
+            model = self.applied(rehearsal.model)
+            model = change(model) if change else model
+            tasks += [(model, variation) for variation in rehearsal.variations]
+        found = self._run(play, tasks)
+        self._tell()
+        return found
+
+    def _gain(self, errors: Sequence[Errors]) -> tuple[float, float]:
+        """How much smaller the error is than what is there, by demonstration: the mean and its standard error."""
+        gain = self._by_demonstration(self.errors) - self._by_demonstration(errors)
+        return float(gain.mean()), float(gain.std(ddof=1) / np.sqrt(len(gain)))
+
+    def _by_demonstration(self, errors: Sequence[Errors]) -> Float[np.ndarray, " n"]:
+        return np.asarray(np.array([e.scores.nmse for e in errors]).reshape(len(self._held_out), -1).mean(1))
+
+    def _note(self, choice: str, value: str, errors: Sequence[Errors], chosen: bool, band: float = 1.0) -> None:
+        found, each = scores(errors, band), self._by_demonstration(errors)
+        doubt = float(each.std(ddof=1) / np.sqrt(len(each)))
+        self.trials.append(Trial(choice, value, found.nmse, doubt, found.coverage, found.nll, chosen))
+
+
+def calibrate(
+    dataset: Dataset,
+    model: Model,
+    learn: Callable[[Dataset], Model],
+    *,
+    fixed: Sequence[str] = (),
+    jobs: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> Model:
+    """The model with everything chosen that is not in `fixed`, and the evidence.
+
+    learn: makes a model of a part of the data set. jobs: processes. progress: is told the share that is done.
+    """
+    choices = {name: candidates for name, candidates in CHOICES.items() if name not in fixed}
+    steps = 3 + sum(len(candidates) for candidates in choices.values())
+    done = 0
+
+    def tell() -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(done / steps)
+
+    held_out = rehearsals(dataset, learn)
+    if len(held_out) < FEWEST - 1:
+        return model
+    tell()
+    with workers(jobs) as run:
+        calibration = Calibration(held_out, run, tell)
+        for name, candidates in choices.items():
+            calibration.choose(name, candidates)
+        calibration.choose_reflex()
+        calibration.choose_band()
+    clock = [by_the_clock(r.model, v).nmse for r in held_out for v in r.variations]
+    evidence = Evidence(len(held_out), tuple(CONDITIONS), tuple(calibration.trials), float(np.mean(clock)))
+    return replace(calibration.applied(model), evidence=evidence)
