@@ -152,12 +152,14 @@ def main() -> int:
     return 0
 
 
-def teller(name: str, begun: float) -> Callable[[int, int], None]:
+def teller(name: str, begun: float) -> Callable[[float], None]:
     """Prints a line at every tenth of the work."""
+    told = [0]
 
-    def tell(done: int, total: int) -> None:
-        if 10 * done // total > 10 * (done - 1) // total:
-            print(f"{name}: {100 * done // total:3d} %, {time.monotonic() - begun:.0f} s", flush=True)
+    def tell(share: float) -> None:
+        if int(10 * share) > told[0]:
+            told[0] = int(10 * share)
+            print(f"{name}: {10 * told[0]:3d} %, {time.monotonic() - begun:.0f} s", flush=True)
 
     return tell
 

@@ -62,7 +62,7 @@ def test_predictors_stand_side_by_side_and_no_two_look_alike():
     looks = {
         (c.lines[0].get_color(), c.lines[0].get_marker(), c.lines[0].get_markerfacecolor()) for c in found.values()
     }
-    assert len(looks) == 7
+    assert len({colour for colour, _, _ in looks}) == len({(marker, face) for _, marker, face in looks}) == 7
     hollow = {name for name, c in found.items() if c.lines[0].get_markerfacecolor() == "white"}
     assert hollow == {"mean trajectory", "ridge"}
 

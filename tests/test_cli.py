@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import itertools
 import json
 import os
 import re
@@ -13,12 +14,14 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from interactions import curves
+from interactions import curves, taught
 from numpy.testing import assert_allclose
 from rich.status import Status
 
@@ -27,9 +30,13 @@ from inphase.basis import FAMILIES, Gaussian, Periodic, Polynomial, Sigmoid
 from inphase.channels import Kind
 from inphase.cli import console, main
 from inphase.cli.basis_text import parse_basis, show_basis
+from inphase.cli.card import describe_model, print_model
+from inphase.cli.evidence import print_evidence
 from inphase.evaluation import replay
+from inphase.evidence import Evidence, Trial
 from inphase.io.csv import write_csv
 from inphase.preprocess.checks import FindingKind
+from inphase.tempo import Tempo
 
 NAMES = ("hand_x", "hand_y", "robot_x", "robot_y")
 ROLES = ["--observed", "hand_?", "--controlled", "robot_?"]
@@ -67,7 +74,7 @@ def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         write(folder / "good")
-        inphase.fit(inphase.load("good", "hand_?", "robot_?")).save("good.inphase")
+        taught(inphase.load("good", "hand_?", "robot_?")).save("good.inphase")
     return folder
 
 
@@ -156,7 +163,7 @@ def nothing(folder: Path) -> None:
     """All that is needed is that something is not there."""
 
 
-FIT = ["-o", "new.inphase", *ROLES]
+FIT = ["-o", "new.inphase", *ROLES, "--quick"]
 
 BAD = [
     # what makes it, the command, what its line says: file, channel, expected, got
@@ -201,6 +208,8 @@ BAD = [
     (nothing, ["replay", "good.inphase", "good", "--filter", "oracle"], ["filter 'oracle'", "bip, ebip"]),
     (nothing, ["replay", "good.inphase", "good", "--filter", "ebip", "--members", "1"], ["at least 2 members, got 1"]),
     (nothing, ["replay", "good.inphase", "good", "--filter", "bip", "--members", "9"], ["'bip' has no option members"]),
+    (nothing, ["replay", "good.inphase", "good", "--filter", "bip", "--particles", "99"], ["has no option particles"]),
+    (nothing, ["replay", "good.inphase", "good", "--particles", "9"], ["at least 10 particles, got 9"]),
     (nothing, ["replay", "good.inphase", "good", "--picture", "a.docx"], ["'a.docx'", ".png, .svg, .pdf"]),
     (nothing, ["replay", "good.inphase", "good", "--picture", "no/a.png"], ["no/a.png", "folder no to exist"]),
     (nothing, ["fit", "good", *ROLES, "-o", "no/a.inphase"], ["no/a.inphase: expected the folder no to exist"]),
@@ -220,6 +229,8 @@ BAD = [
     (nothing, ["fit", "good", *FIT, "--basis", "polynomial:5:0.1"], ["--basis: expected polynomial:degree, got"]),
     (nothing, ["fit", "good", *FIT, "--basis", "gaussian:9", "--periodic"], ["both periodic or both not"]),
     (nothing, ["fit", "good", *FIT, "--order", "3"], ["order 0, 1 or 2, got 3"]),
+    (nothing, ["fit", "good", *FIT, "--jobs", "0"], ["--jobs: expected at least 1, got 0"]),
+    (nothing, ["inspect", "good", "--report"], ["--report: expected a model file (.inphase), got good"]),
     (nothing, ["fit", "good", "--observed", "paw_?", "--controlled", "robot_?"], ["no channel fits 'paw_?'", "hand_x"]),
     (nothing, ["fit", "good", "--observed", "hand_?", "*_x", "--controlled", "robot_?"], ["as both: robot_x"]),
     (nothing, ["fit", "good", "--observed", "hand_?"], ["--observed and --controlled", "hand_x, hand_y, robot_x"]),
@@ -301,7 +312,7 @@ def test_fit_learns_what_the_library_learns(here, run):
     code, out, err = run("fit", "good", *FIT)
     assert (code, err) == (0, "")
     model = inphase.Model.load("new.inphase")
-    expected = inphase.fit(inphase.load("good", "hand_?", "robot_?"))
+    expected = taught(inphase.load("good", "hand_?", "robot_?"))
     assert (model.observed, model.controlled) == (("hand_x", "hand_y"), ("robot_x", "robot_y"))
     assert_allclose(model.prior.samples, expected.prior.samples)
     assert "2 observed and 2 controlled channels, 4 demonstrations" in out
@@ -382,6 +393,152 @@ def test_every_family_can_be_named():
     assert {type(parse_basis(f"{family}:5")) for family in FAMILIES} == set(FAMILIES.values())
 
 
+# ----------------------------------------------------------------------------------------------------------- evidence
+
+
+@pytest.fixture(scope="module")
+def calibrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[inphase.Model, Path, str]:
+    """A model whose choices were made by held-out recordings, its file, and what `fit --report` said."""
+    folder = tmp_path_factory.mktemp("calibrated")
+    write(folder / "few", samples=25)
+    roles, file = [*ROLES, "--jobs", "1"], folder / "calibrated.inphase"
+    result = command("fit", "few", *roles, "--report", "-o", str(file), cwd=folder, capture_output=True)
+    assert (result.returncode, result.stderr) == (0, "")
+    return inphase.Model.load(file), file, result.stdout
+
+
+def numbers(text: str) -> list[float]:
+    return [float(number) for number in re.findall(r"-?\d+\.?\d*", text)]
+
+
+def said_of(trial: Trial) -> list[float]:
+    """What a row of the table ends with: error, its standard error, inside [%], nll."""
+    return pytest.approx([trial.error, trial.error_std, round(100 * trial.coverage), trial.nll], abs=6e-4)
+
+
+def test_the_report_tells_of_every_trial_and_marks_what_was_chosen(calibrated):
+    model, _, out = calibrated
+    assert model.evidence is not None
+    trials = model.evidence.trials[1:]
+    rows = [line for line in out.splitlines() if re.match(r" [ *] \S", line)]
+    assert len(rows) == len(trials)
+    for row, trial in zip(rows, trials, strict=True):
+        assert numbers(row)[-4:] == said_of(trial)
+        assert (row[1] == "*") == trial.chosen
+    for before, after in itertools.pairwise(dict.fromkeys(trial.choice for trial in trials)):
+        assert 0 < out.index(f"\n{before}: ") < out.index(f"\n{after}: ")
+    lines = {line.split("  ")[0]: line for line in out.splitlines()}
+    assert numbers(lines["before"]) == said_of(model.evidence.before)
+    assert numbers(lines["after"]) == said_of(model.evidence.after)
+    assert numbers(lines["by the clock"]) == pytest.approx([model.evidence.by_the_clock], abs=6e-4)
+    # Every number of a kind stands under the others.
+    (title,) = [line for line in out.splitlines() if line.split() == ["error", "inside", "nll"]]
+    ends = {line.index(" ±") for line in [*rows, lines["before"], lines["after"]]}
+    assert ends == {len(lines["by the clock"])}
+    assert {len(line) for line in [*rows, lines["before"], lines["after"]]} == {len(title)}
+    assert "4 demonstrations held out" in out
+    assert [condition for condition in model.evidence.conditions if condition not in " ".join(out.split())] == []
+
+
+def test_the_card_tells_what_the_model_has(calibrated):
+    """The choices by the parts of the model that they made, and not by the evidence."""
+    model, _, out = calibrated
+    usual = Tempo().usual
+    lines = out.splitlines()
+    at = next(i for i, line in enumerate(lines) if line.startswith("calibrated: "))
+    end = next(i for i, line in enumerate(lines) if "held out: error" in line)
+    assert "as it is" not in out
+    chosen = dict(re.findall(r"(usual tempo|reflex|band) ([\d.]+)", " ".join(lines[at:end])))
+    assert model.reflex is not None
+    assert float(chosen["band"]) == pytest.approx(model.band, abs=6e-3)
+    assert float(chosen.get("reflex", 0)) == pytest.approx(model.reflex.share, abs=6e-3)
+    assert float(chosen.get("usual tempo", 100 * usual)) == pytest.approx(100 * model.tempo.usual)
+    evidence = model.evidence
+    assert evidence is not None
+    _, before, after, _, *inside = numbers(lines[end])
+    assert [before, after] == pytest.approx([evidence.before.error, evidence.after.error], abs=6e-4)
+    assert inside == pytest.approx([round(100 * t.coverage) for t in (evidence.before, evidence.after)])
+
+
+def test_inspect_tells_the_same_from_the_file(calibrated, run):
+    model, file, out = calibrated
+    shown = run("inspect", file, "--report")[1]
+    report = out[out.index("4 demonstrations held out, ") : out.index("wrote ")]
+    assert shown.endswith(report)
+    assert out.startswith(run("inspect", file)[1].split("source: ")[0])
+    assert report not in run("inspect", file)[1]
+    evidence = json.loads(run("inspect", file, "--json")[1])["evidence"]
+    assert evidence == json.loads(json.dumps(asdict(model.evidence)))
+
+
+def test_what_could_not_be_scored_is_no_number(calibrated):
+    model, nan = calibrated[0], float("nan")
+    blank = Trial("before", "as learned", nan, nan, nan, nan, True)
+    unscored = replace(model, evidence=Evidence(4, ("as recorded",), (blank, blank), nan))
+    text = json.dumps(describe_model(unscored), allow_nan=False)
+    assert json.loads(text)["evidence"]["trials"][0]["error"] is None
+
+
+@pytest.mark.parametrize("size", [1e-9, 12.3456, 1.23e9, float("nan"), float("inf")])
+@pytest.mark.parametrize("width", [80, 120])
+def test_no_figure_breaks_the_report(size, width, calibrated, capsys, monkeypatch):
+    """Nor a choice that is not known here, or all of them at once on the card."""
+    monkeypatch.setenv("COLUMNS", str(width))
+    model = calibrated[0]
+    assert model.evidence is not None
+    figures = {"error": size, "error_std": size, "nll": -size}
+    trials = [replace(trial, chosen=i % 2 == 1, **figures) for i, trial in enumerate(model.evidence.trials)]
+    trials += [Trial("another", value, size, size, 0.0, size, value == "what is new") for value in ("", "what is new")]
+    odd = replace(model, evidence=replace(model.evidence, trials=tuple(trials), by_the_clock=size))
+    output = console.Output()
+    print_model(output, odd)
+    print_evidence(output, odd)
+    out = capsys.readouterr().out
+    assert [line for line in out.splitlines() if len(line) > 80] == []
+    assert "another what is new" in out
+    assert " * what is new" in out
+    (title,) = [line for line in out.splitlines() if line.split() == ["error", "inside", "nll"]]
+    assert {len(line) for line in out.splitlines() if re.match(r"( [ *] |before |after )", line)} == {len(title)}
+
+
+def test_what_is_not_calibrated_says_so_in_one_line(here, run):
+    learned = taught(inphase.load("good", "hand_?", "robot_?"))
+    out = run("fit", "good", *FIT, "--report")[1]
+    model = inphase.Model.load("new.inphase")
+    assert model.evidence is None
+    assert (model.band, model.tempo) == (learned.band, learned.tempo)
+    assert [line for line in out.splitlines() if "held out" in line] == [
+        "not calibrated: no demonstrations were held out"
+    ]
+    write(here / "few", count=3)
+    out = run("fit", "few", *ROLES, "--report")[1]
+    assert [line for line in out.splitlines() if "held out" in line] == [
+        "not calibrated: no demonstrations were held out, since there are fewer than 4"
+    ]
+    assert json.loads(run("inspect", "new.inphase", "--json")[1])["evidence"] is None
+
+
+def test_all_processors_calibrate_unless_told_otherwise(here, run, monkeypatch):
+    from joblib import cpu_count
+
+    asked: dict[str, Any] = {}
+
+    def fit(dataset: inphase.Dataset, **options: Any) -> inphase.Model:
+        asked.clear()
+        asked.update(options)
+        return inphase.Model.load("good.inphase")
+
+    monkeypatch.setattr("inphase.cli.fit.fit_model", fit)
+    for words, calibrate, jobs in (
+        ([], True, cpu_count()),
+        (["--jobs", 3], True, 3),
+        (["--quick"], False, cpu_count()),
+    ):
+        assert run("fit", "good", *ROLES, *words)[0] == 0
+        assert (asked["calibrate"], asked["jobs"]) == (calibrate, jobs)
+        assert asked["progress"] is None  # nobody looks
+
+
 # ------------------------------------------------------------------------------------------------------------- replay
 
 
@@ -399,6 +556,15 @@ def test_replay_says_what_the_library_says(here, run):
     assert found["log_likelihood"] == pytest.approx(played.log_likelihood)
     assert 0 < found["step_time"] < 10
     assert {"clock_nmse", "clock_coverage", "clock_nll"} <= set(found)
+
+
+@pytest.mark.parametrize(("filter", "option"), [("rbpf", "particles"), ("ebip", "members")])
+def test_a_filter_is_as_large_as_told(filter, option, here, run):
+    model, demonstration = inphase.Model.load("good.inphase"), inphase.Demonstration(*episode(1))
+    out = run("replay", "good.inphase", "good/episode_1.csv", "--filter", filter, f"--{option}", 20, "--json")[1]
+    played = replay(model, demonstration, filter=filter, **{option: 20})
+    assert json.loads(out)[0]["nmse"] == pytest.approx(played.now.nmse)
+    assert played.now.nmse != replay(model, demonstration, filter=filter).now.nmse
 
 
 def test_replay_prints_as_it_goes_and_what_came_of_it(here, run):
@@ -458,7 +624,11 @@ def test_names_are_shown_as_they_are(here, run):
     names = ("force[x]", ":smile:", "[bold]a", "b[/]")
     write(here / "odd", names=names)
     roles = ["--observed", *names[:2], "--controlled", *names[2:]]
-    for command in (["fit", "odd", *roles, "-o", "odd.inphase"], ["inspect", "odd.inphase"], ["inspect", "odd"]):
+    for command in (
+        ["fit", "odd", *roles, "-o", "odd.inphase", "--quick"],
+        ["inspect", "odd.inphase"],
+        ["inspect", "odd"],
+    ):
         code, out, _ = run(*command)
         assert code == 0
         assert [name for name in names if name not in out] == []
@@ -519,7 +689,7 @@ def test_a_channel_that_never_moves_is_a_warning(here, run):
 # ------------------------------------------------------------------------------------------------------ where it prints
 
 SHOWN = [
-    ["fit", "long", "-o", "long.inphase", "--observed", "left_*", "--controlled", "robot_*"],
+    ["fit", "long", "-o", "long.inphase", "--observed", "left_*", "--controlled", "robot_*", "--quick"],
     ["inspect", "good.inphase"],
     ["inspect", "long"],
     ["replay", "good.inphase", "good/episode_1.csv"],
@@ -620,6 +790,22 @@ def test_a_short_wait_is_not(started, monkeypatch):
     assert threading.active_count() == threads
 
 
+def test_the_share_that_is_done_moves_a_bar(started, capsys):
+    with console.working("learning") as tell:
+        assert tell is not None
+        tell(0.5)
+        tell(1.0)
+    shown = re.sub(r"\x1b\[[\d;?]*[a-zA-Z]", "", capsys.readouterr().err)
+    assert "learning ━" in shown
+    assert "0:00:00 left" in shown
+
+
+def test_without_a_terminal_there_is_no_bar(capsys):
+    with console.working("learning") as tell:
+        assert tell is None
+    assert capsys.readouterr().err == ""
+
+
 def test_without_a_terminal_nothing_is_explained(started, monkeypatch):
     monkeypatch.setattr(console, "PATIENCE", 0.0)
     monkeypatch.setattr(console.Output, "is_terminal", property(lambda self: False))
@@ -636,7 +822,9 @@ def test_a_hand_over_is_learned_and_followed(shared_data, tmp_path, monkeypatch,
     """The commands of the README, on recordings of people."""
     monkeypatch.chdir(tmp_path)
     data = shared_data / "handover"
-    code, out, _ = run("fit", data, "--observed", "taker_?", "--controlled", "giver_?", "-o", "handover.inphase")
+    code, out, _ = run(
+        "fit", data, "--observed", "taker_?", "--controlled", "giver_?", "-o", "handover.inphase", "--quick"
+    )
     assert code == 0
     assert "3 observed and 3 controlled channels, 72 demonstrations" in out
     assert run("inspect", "handover.inphase")[0] == 0
@@ -682,6 +870,7 @@ def test_the_page_on_data_is_true(tmp_path, monkeypatch, run):
         columns = np.column_stack([np.sin(angle), np.cos(angle), np.angle(np.exp(1j * (2 + angle))), turn])
         write_csv(tmp_path / "handover" / f"episode_{i}.csv", shown.names, times, columns)
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(inphase, "fit", partial(inphase.fit, calibrate=False))
     names: dict[str, Any] = {}
     with contextlib.redirect_stdout(io.StringIO()):
         exec(compile(blocks["python"], PAGE, "exec"), names)
@@ -689,7 +878,7 @@ def test_the_page_on_data_is_true(tmp_path, monkeypatch, run):
     assert names["demos"].channels[0].unit == "m"
     assert len(names["demos_of_arrays"]) == 3
     for command in re.findall(r"`inphase (fit .*?)`", text):
-        assert run(*shlex.split(command))[0] == 0
+        assert run(*shlex.split(command), "--quick")[0] == 0
 
     rows = set(re.findall(r"^\| `([\w-]+)` \|", text, flags=re.MULTILINE))
     assert rows == {kind.value for kind in (*FindingKind, *Kind)}

@@ -11,6 +11,7 @@ import struct
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -96,7 +97,8 @@ def test_it_ends_with_the_picture_and_what_to_try_next(told, monkeypatch, capsys
     # They really work, pasted in the same folder.
     monkeypatch.chdir(told[0])
     for words in commands:
-        assert main(words[1:]) == 0, capsys.readouterr().err
+        shorter = ["--quick"] if words[1] == "fit" else []
+        assert main([*words[1:], *shorter]) == 0, capsys.readouterr().err
         assert capsys.readouterr().out
     assert Path("my.inphase").exists()
 
@@ -113,6 +115,22 @@ def test_a_second_demo_writes_the_same_over_the_first(told, monkeypatch, capsys)
     picture = Path("my demo/demo.png")
     assert before.pop(picture) != after.pop(picture)  # it shows one shape now
     assert before == after
+
+
+def test_it_calibrates_on_all_processors_if_asked(told, tmp_path, monkeypatch, capsys):
+    from joblib import cpu_count
+
+    asked: dict[str, Any] = {}
+
+    def fit(dataset: inphase.Dataset, **options: Any) -> inphase.Model:
+        asked.update(options)
+        raise inphase.OptionError("that will do")
+
+    monkeypatch.setattr("inphase.cli.demo.fit", fit)
+    assert main(["demo", "--shapes", "Line", "--filter", "bip", "--calibrate", "-o", str(tmp_path)]) == 2
+    assert (asked["calibrate"], asked["jobs"]) == (True, cpu_count())
+    assert "--calibrate" not in capsys.readouterr().out
+    assert told[1].splitlines()[1].endswith("--calibrate does.")
 
 
 def test_how_the_program_was_called_is_how_it_is_called_again(monkeypatch, tmp_path):

@@ -309,13 +309,14 @@ def test_a_mixture_keeps_to_the_ways_that_were_shown_and_a_gaussian_does_not(rng
 def test_partners_are_as_correlated_as_they_are_trusted(prior: str, rng: np.random.Generator) -> None:
     plain = two_ways(rng, phase_model())
     samples = plain.prior.samples[:, [0, 1, -2, -1]]
-    believed = inphase.WeightPrior(samples, trust=0.5, partner=2, shrinkage=0.0 if prior == "demonstrations" else 0.3)
+    shrinkage = 0.0 if prior == "demonstrations" else 0.3
+    believed = inphase.WeightPrior(samples, shrinkage, trust=0.5, partner=2, blocks=(2, 2))
     count = 20_000
     whole = np.zeros((len(samples), plain.layout.size))
     whole[:, [0, 1, -2, -1]] = samples
     split = plain.layout.slices[2].start
     model = dataclasses.replace(
-        plain, prior=dataclasses.replace(believed, samples=whole, partner=split, shrinkage=believed.shrinkage)
+        plain, prior=inphase.WeightPrior(whole, shrinkage, 0.5, split, tuple(b.size for b in plain.layout.bases))
     )
     members = make("ebip", model, members=count, prior=prior).init(rng).members[:, 2:][:, [0, 1, -2, -1]]
     stds = np.sqrt(np.diag(believed.cov))

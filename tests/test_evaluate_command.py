@@ -23,7 +23,7 @@ from inphase.io.csv import write_csv
 ROOT = Path(__file__).parents[1]
 NAMES = ("hand_x", "hand_y", "robot_x", "robot_y")
 ROLES = ["--observed", "hand_?", "--controlled", "robot_?"]
-ONE_JOB = [*ROLES, "--filters", "bip", "--jobs", "1", "--folds", "3"]  # models of few episodes are learned in no time
+ONE_JOB = [*ROLES, "--filters", "bip", "--jobs", "1", "--folds", "3", "--quick"]
 SOME = ["--conditions", "as recorded", "lost 30 %"]
 
 
@@ -68,6 +68,10 @@ def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str
     return command
 
 
+def plain(train: inphase.Dataset) -> inphase.Model:
+    return inphase.fit(train, calibrate=False)
+
+
 def tree(folder: Path) -> dict[str, bytes | None]:
     return {str(p.relative_to(folder)): p.read_bytes() if p.is_file() else None for p in folder.rglob("*")}
 
@@ -84,7 +88,9 @@ def test_it_says_what_the_library_says(here, run):
     assert (code, err) == (0, "")
     said = json.loads(out)
     assert (said["folds"], said["seed"]) == (2, 4)
-    expected = evaluate({"reach": loaded("reach")}, ["bip"], folds=2, conditions=["as recorded", "lost 30 %"], seed=4)
+    expected = evaluate(
+        {"reach": loaded("reach")}, ["bip"], folds=2, conditions=["as recorded", "lost 30 %"], seed=4, fit=plain
+    )
     assert len(said["episodes"]) == len(expected.rows) == 4 * 3 * 2
     for got, row in zip(said["episodes"], expected.rows, strict=True):
         assert got == vars(row)
@@ -107,7 +113,9 @@ def cells(block: str) -> dict[str, list[tuple[str, str, str]]]:
 def test_tables_hold_the_figures_and_mark_the_best(here, run):
     code, out, err = run("reach", *ONE_JOB, *SOME)
     assert (code, err) == (0, "")
-    expected = evaluate({"reach": loaded("reach")}, ["bip"], folds=3, conditions=["as recorded", "lost 30 %"])
+    expected = evaluate(
+        {"reach": loaded("reach")}, ["bip"], folds=3, conditions=["as recorded", "lost 30 %"], fit=plain
+    )
     head, now = out.split("\n\n")[0].split("\n", 1)
     assert head == "reach: 4 episodes"
     tables = dict(zip(("now", "end50", "nll"), [now, *out.split("\n\n")[1:3]], strict=True))
@@ -148,7 +156,7 @@ def test_the_best_stands_out_whatever_its_name(capsys):
 def test_several_folders_are_several_tasks(here, run):
     said = json.loads(run("reach", "wave", *ONE_JOB, *SOME, "--json")[1])
     alone = {
-        name: evaluate({name: loaded(name)}, ["bip"], folds=3, conditions=["as recorded", "lost 30 %"])
+        name: evaluate({name: loaded(name)}, ["bip"], folds=3, conditions=["as recorded", "lost 30 %"], fit=plain)
         for name in ("reach", "wave")
     }
     by = {(f["task"], f["predictor"], f["condition"]): f for f in said["figures"]}
@@ -183,18 +191,34 @@ def test_folders_of_equal_names_are_told_apart(here, run):
     assert {row["task"] for row in said["episodes"]} == {"reach", "monday/reach"}
 
 
-def test_who_names_nothing_gets_the_recommended_filter_and_all_conditions(run, monkeypatch, here):
-    asked: dict[str, Any] = {}
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """What the library was asked for, without an answer."""
+    options: dict[str, Any] = {}
 
-    def never(tasks: dict[str, inphase.Dataset], filters: tuple[str, ...], **options: Any) -> Evaluation:
-        asked.update(options, filters=filters)
+    def never(tasks: dict[str, inphase.Dataset], filters: tuple[str, ...], **more: Any) -> Evaluation:
+        options.update(more, filters=filters)
         raise KeyboardInterrupt
 
     monkeypatch.setattr("inphase.cli.evaluate.cross_validate", never)
-    assert run("reach", *ROLES) == (130, "", "inphase: stopped\n")
+    return options
+
+
+def test_the_library_is_asked_for_what_was_wanted(run, asked, here):
+    words = ["--filters", "bip", "ebip", "--folds", 3, "--conditions", "pause 2 s", "--seed", 7, "--jobs", 5]
+    assert run("reach", *ROLES, *words) == (130, "", "inphase: stopped\n")
+    assert asked.pop("progress") is None
+    assert asked.pop("fit").keywords == {"calibrate": True}
+    assert asked == {"filters": ("bip", "ebip"), "folds": 3, "conditions": ("pause 2 s",), "seed": 7, "jobs": 5}
+
+
+def test_who_names_nothing_gets_the_recommended_filter_and_all_conditions(run, asked, here):
+    run("reach", *ROLES)
     assert asked["filters"] == (inphase.filters.RECOMMENDED,)
     assert asked["conditions"] == tuple(CONDITIONS)
     assert asked["jobs"] >= 1
+    run("reach", *ROLES, "--quick")
+    assert asked["fit"].keywords == {"calibrate": False}
     out = run("--help")[1]
     assert "'pause 2 s'" in out
     for clutter in ("default: )", "None", "--no-"):
@@ -211,7 +235,7 @@ def test_an_error_in_another_process_is_told_in_one_line(here, run):
         path = here / "wave" / f"episode_{i}.csv"
         lines = path.read_text().splitlines()
         path.write_text("\n".join([lines[0], *(line.rsplit(",", 1)[0] + "," for line in lines[1:])]) + "\n")
-    code, out, err = run("reach", "wave", *ROLES, "--filters", "bip", "--folds", 3, "--jobs", 2, *SOME)
+    code, out, err = run("reach", "wave", *ROLES, "--filters", "bip", "--folds", 3, "--quick", "--jobs", 2, *SOME)
     assert (code, out) == (2, "")
     assert err == "inphase: wave: channel 'robot_y': expected readings, got none in any of 2 demonstrations\n"
 
@@ -250,7 +274,9 @@ def test_what_was_not_scored_is_null(here, run):
     "at", ["inphase.cli.evaluate.cross_validate", "pathlib.Path.write_text", "inphase.cli.reading.load"]
 )
 def test_an_interrupt_leaves_nothing(at, here, run, monkeypatch):
-    def interrupted(*_: object, **__: object) -> None:
+    def interrupted(first: object, *_: object, **__: object) -> None:
+        if isinstance(first, Path):
+            first.write_bytes(b"half of the")
         raise KeyboardInterrupt
 
     (here / "found.json").write_text("the old figures")
@@ -262,11 +288,11 @@ def test_an_interrupt_leaves_nothing(at, here, run, monkeypatch):
 
 
 def test_a_terminal_is_shown_how_far_it_is(here, run, monkeypatch):
-    shown: list[tuple[int, int]] = []
+    shown: list[float] = []
     monkeypatch.setattr(console.Output, "is_terminal", property(lambda self: True))
-    monkeypatch.setattr(Progress, "update", lambda self, task, completed, total: shown.append((completed, total)))
+    monkeypatch.setattr(Progress, "update", lambda self, task, completed: shown.append(completed))
     assert run("reach", *ONE_JOB, *SOME, "--folds", 2)[0] == 0
-    assert shown == [(i, 14) for i in range(1, 15)]
+    assert shown == [i / 14 for i in range(1, 15)]
     monkeypatch.setattr(console.Output, "is_terminal", property(lambda self: False))
     shown.clear()
     assert run("reach", *ONE_JOB, *SOME, "--folds", 2)[2] == ""
@@ -278,7 +304,7 @@ def test_a_terminal_is_shown_how_far_it_is(here, run, monkeypatch):
 BAD = [
     (["reach", *ONE_JOB, "--folds", "6"], ["reach: expected at least 6 episodes, one for each of 6 folds, got 4"]),
     (["wave", *ONE_JOB, "--folds", "1"], ["folds", "at least 2, got 1"]),
-    (["wave", *ROLES, "--jobs", "0"], ["jobs", "at least 1, got 0"]),
+    (["wave", *ROLES, "--jobs", "0"], ["--jobs", "at least 1, got 0"]),
     (["wave", *ROLES, "--filters", "oracle"], ["unknown filter 'oracle'", "'bip'"]),
     (["wave", *ROLES, "--conditions", "upside down"], ["unknown condition 'upside down'", "'pause 2 s'"]),
     (["wave"], ["--observed and --controlled", "hand_x, hand_y, robot_x, robot_y"]),

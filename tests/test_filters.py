@@ -17,7 +17,7 @@ from scipy.stats import multivariate_normal
 
 import inphase
 from inphase.filters import FILTERS, Course, EnsembleBelief, Filter, GaussianBelief, make, rbpf, tempo
-from inphase.filters.motion import root
+from inphase.filters.motion import begin, root
 from inphase.mixture import Mixture
 from inphase.observation import NOTHING, Observation
 from inphase.phase import PhaseModel
@@ -80,14 +80,15 @@ def textbook_ekf(model: inphase.Model, steps: Steps) -> tuple[np.ndarray, np.nda
 def textbook_enkf(model: inphase.Model, steps: Steps, count: int, prior: str, seed: int) -> tuple[np.ndarray, float]:
     """Fig. 23 as it is printed, member by member: members (E, K + B) and the summed log-likelihood.
 
-    It draws in the order of the filter. A covariance has many roots; that the filter's is one is a test of its own.
+    It draws in the order of the filter. A covariance has many roots; that the filter's is one is a test of its own,
+    and so is where members begin.
     """
     phase, rng, total = model.phase, np.random.default_rng(seed), 0.0
-    size, start = len(phase.mean), rng.standard_normal((count, len(phase.mean)))
+    size, start = len(phase.mean), begin(phase, count, rng)
     demonstrations = model.prior
     sources = {"gaussian": demonstrations, "mixture": Mixture.learn(demonstrations.samples)}
     weights = sources[prior].draw(count, rng) if prior in sources else demonstrations.resample(count, rng)
-    members = [np.concatenate([phase.mean + root(phase.cov) @ z, w]) for z, w in zip(start, weights, strict=True)]
+    members = [np.concatenate(parts) for parts in zip(start, weights, strict=True)]
     members = confined(model, members)
     for seen, dt in steps:
         if dt > 0:

@@ -310,7 +310,8 @@ def test_a_hand_that_turns_is_followed(name: str, turns: list, rng: np.random.Ge
     # The weights of a bootstrap filter stay those of demonstrations: it knows no other partner.
     model, (times, values) = taught(turning(turns)), turns[0] if name == "particle" else rotation(rng)
     session, estimates, _ = follow(model, times[:30], list(values[:30, :5]), name)
-    assert np.abs(estimates[10:, 0] - (times / times[-1])[10:30]).max() < 0.05
+    # An alignment with the mean trajectory takes a hand that turns less far for one that is late.
+    assert np.abs(estimates[10:, 0] - (times / times[-1])[10:30]).max() < (0.1 if name == "promp" else 0.05)
     # The last two fifths, in phase with what really came; the palm is compared as rotations.
     response = session.respond(samples=21, channels=[*ROBOT, *HAND])
     real = np.stack([np.interp(response.phases, times / times[-1], np.unwrap(v)) for v in values.T], axis=1)

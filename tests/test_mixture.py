@@ -274,12 +274,13 @@ def test_a_mixture_is_read_only(rng: np.random.Generator) -> None:
 # --------------------------------------------------------------------------------------- draws that are to be believed
 
 
+@pytest.mark.parametrize("blocks", [(), (1, 1, 2), (1, 3)])
 @pytest.mark.parametrize(("shrinkage", "trust"), [(0.0, 1.0), (0.4, 1.0), (0.0, 0.5), (0.4, 0.5), (1.0, 0.0)])
 def test_what_is_drawn_elsewhere_gets_the_covariance_that_is_believed(
-    shrinkage: float, trust: float, rng: np.random.Generator
+    shrinkage: float, trust: float, blocks: tuple[int, ...], rng: np.random.Generator
 ) -> None:
     samples, _ = ways(rng, (9, 15), size=4)
-    prior, count = WeightPrior(samples, shrinkage, trust, partner=2), 20_000
+    prior, count = WeightPrior(samples, shrinkage, trust, partner=2, blocks=blocks), 20_000
     believed = prior.as_believed(Mixture.learn(samples).draw(count, rng), rng)
     stds = np.sqrt(np.diag(prior.cov))
     assert (np.abs(np.cov(believed, rowvar=False) - prior.cov) < 5 * np.outer(stds, stds) * np.sqrt(2 / count)).all()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
 import struct
@@ -22,6 +23,7 @@ import inphase
 from inphase.basis import Gaussian, Layout, Periodic, Polynomial, Sigmoid
 from inphase.channels import make_channels
 from inphase.preprocess.coordinates import Coordinates
+from inphase.tempo import Tempo
 
 RELEASED = Path(__file__).parent / "files"
 
@@ -101,7 +103,7 @@ def assert_same_model(one: inphase.Model, other: inphase.Model) -> None:
     numbers = {
         "coordinates": ["references"],
         "scaling": ["low", "high"],
-        "prior": ["samples", "shrinkage", "trust", "partner"],
+        "prior": ["samples", "shrinkage", "trust", "partner", "blocks"],
         "noise": ["var", "correlation_time"],
         "phase": ["mean", "cov", "diffusion", "nominal_velocity", "periodic"],
     }
@@ -241,8 +243,8 @@ def test_other_files(tmp_path, whole):
 
 
 def test_a_newer_version_says_so(whole, scratch):
-    message = refused(scratch, whole[:8] + struct.pack("<I", 2) + whole[12:])
-    assert "expected model format 1 or older, got 2: written by a newer inphase" in message
+    message = refused(scratch, whole[:8] + struct.pack("<I", 3) + whole[12:])
+    assert "expected model format 2 or older, got 3: written by a newer inphase" in message
 
 
 def cheaply_refused(path: Path) -> str:
@@ -285,17 +287,34 @@ def parts(content: bytes) -> tuple[dict[str, Any], bytes]:
     return json.loads(content[56 : 56 + size]), content[56 + size :]
 
 
-def sealed(header: Any, payload: bytes) -> bytes:
+def sealed(header: Any, payload: bytes, version: int = 2) -> bytes:
     """A file with a good checksum over whatever it holds."""
     text = header if isinstance(header, bytes) else json.dumps(header).encode()
     digest = hashlib.sha256(text + payload).digest()
-    return b"INPHASE\n" + struct.pack("<IIQ", 1, len(text), len(payload)) + digest + text + payload
+    return b"INPHASE\n" + struct.pack("<IIQ", version, len(text), len(payload)) + digest + text + payload
 
 
 def test_the_format_is_what_it_promises_to_be(whole, scratch):
     header, payload = parts(whole)
     scratch.write_bytes(sealed(header, payload))
     assert_same_model(inphase.Model.load(scratch), tiny())
+
+
+def test_the_first_format_had_no_blocks_and_shrank_to_the_diagonal(whole, scratch):
+    header, payload = parts(whole)
+    for name in ("tempo", "reflex", "band", "evidence"):
+        del header[name]
+    del header["prior"]["blocks"]
+    scratch.write_bytes(sealed(header, payload, version=1))
+    model = inphase.Model.load(scratch)
+    assert_same_model(model, tiny())
+    weights = model.prior.samples
+    expected = np.cov(weights, rowvar=False) * np.where(np.eye(7), 1, 0.75)
+    expected[:4, 4:] *= 0.75
+    expected[4:, :4] *= 0.75
+    assert_allclose(model.prior.cov, expected, atol=1e-12)
+    assert "prior" in refused(scratch, sealed({k: v for k, v in header.items() if k != "prior"}, payload, version=1))
+    assert "header" in refused(scratch, sealed(header | {"prior": []}, payload, version=1))
 
 
 def entry(header: Any, path: str) -> tuple[Any, Any]:
@@ -315,12 +334,15 @@ def paths(value: Any, prefix: str = "") -> list[str]:
     return found
 
 
+TEMPO = [field.name for field in dataclasses.fields(Tempo)]
 HEADER = {  # the shape of the header of `tiny`, for the parameters below
     "channels": [dict.fromkeys(("name", "role", "unit", "kind", "group"), "")] * 2,
     "bases": [{"family": "", "size": 0, "width": 0, "margin": 0}, {"family": "", "degree": 0}],
     "basis_of_feature": [0, 0],
-    "prior": {"shrinkage": 0, "trust": 0, "partner": 0},
+    "prior": {"shrinkage": 0, "trust": 0, "partner": 0, "blocks": []},
     "phase": {"diffusion": 0, "nominal_velocity": 0, "periodic": 0},
+    "tempo": dict.fromkeys(TEMPO, 0),
+    **dict.fromkeys(("reflex", "band", "evidence"), 0),
     "provenance": {},
     "arrays": {
         name: [0]
@@ -346,6 +368,8 @@ def test_a_missing_entry(path, whole, scratch):
     del owner[key]
     if path in ("bases.0.width", "bases.0.margin"):  # those that may be missing: there are usual ones
         assert isinstance(inphase.Model.load(written(scratch, header, payload)).layout.bases[0], Gaussian)
+    elif path.startswith("tempo."):
+        assert inphase.Model.load(written(scratch, header, payload)).tempo == Tempo()
     else:
         message = refused(scratch, sealed(header, payload))
         assert str(key) in message or (path.startswith("arrays.") and "bytes, got 312" in message)
@@ -382,6 +406,13 @@ RIGHT = {  # what of the above is a value like any other
     ("prior.shrinkage", "fraction"),
     ("prior.trust", "fraction"),
     ("prior.partner", "number"),
+    ("prior.blocks", "empty list"),
+    ("tempo", "empty object"),
+    *(("tempo." + name, "fraction") for name in TEMPO),
+    *(("tempo." + name, kind) for name in TEMPO if name not in ("usual", "steady") for kind in ("number", "huge")),
+    *(("band", kind) for kind in ("number", "fraction", "huge")),
+    ("reflex", "null"),
+    ("evidence", "null"),
     ("provenance", "empty object"),
 }
 
@@ -521,6 +552,10 @@ def changed(**entries: Any) -> Callable[[dict[str, Any]], None]:
         (changed(channels__1__role="observed"), "controlled"),
         (changed(prior__shrinkage=1.5), "shrinkage"),
         (changed(prior__trust=1.5), "trust"),
+        (changed(prior__blocks=[4, 4]), "blocks of 7 weights together, got 4, 4"),
+        (changed(prior__blocks=[7, 0]), "blocks"),
+        (changed(prior__blocks=[3.5, 3.5]), "whole number"),
+        (changed(prior__blocks=[-1, 8]), "whole number"),
         (changed(prior__partner=8), ""),
         (changed(phase__periodic=True), "periodic"),
         (changed(phase__nominal_velocity=0), "nominal_velocity"),

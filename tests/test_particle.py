@@ -16,7 +16,7 @@ from test_filters import PHASES, Steps, assert_close, closed_form, run, samples,
 import inphase
 from inphase.errors import OptionError
 from inphase.filters import Course, WeightedBelief, make, rbpf, tempo
-from inphase.filters.motion import root
+from inphase.filters.motion import begin, root
 from inphase.filters.resampling import effective_size, systematic
 from inphase.observation import Observation
 from inphase.phase import PhaseModel
@@ -65,9 +65,9 @@ def textbook_particles(
     It draws in the order of the filter. Periodic phases are not wrapped: the bases are periodic.
     """
     phase, rng, total = model.phase, np.random.default_rng(seed), 0.0
-    size, start = len(phase.mean), rng.standard_normal((count, len(phase.mean)))
+    size, start = len(phase.mean), begin(phase, count, rng)
     drawn = model.prior.draw(count, rng) if prior == "gaussian" else model.prior.resample(count, rng)
-    particles = [np.concatenate([phase.mean + root(phase.cov) @ z, w]) for z, w in zip(start, drawn, strict=True)]
+    particles = [np.concatenate([moving, w]) for moving, w in zip(start, drawn, strict=True)]
     weights = [1 / count] * count
     for seen, dt in [(None, 0.0), *steps]:
         if dt > 0:

@@ -17,9 +17,10 @@ from scipy.spatial.transform import Rotation
 
 import inphase
 from inphase.channels import make_channels
-from inphase.evaluation import BASELINES, CONDITIONS, METRICS, Evaluation, Row, evaluate, replay, warp
+from inphase.evaluation import BASELINES, CONDITIONS, METRICS, Evaluation, Predictor, Row, evaluate, replay, warp
 from inphase.evaluation.baselines import GRID, MeanTrajectory, Ridge
 from inphase.evaluation.conditions import ticks
+from inphase.evaluation.partners import Partners
 from inphase.filters import FILTERS
 
 AS_RECORDED = ["as recorded"]
@@ -96,10 +97,10 @@ def test_an_oracle_scores_nothing_and_covers_all(std, rng):
 def test_the_training_mean_scores_one():
     """To the last digit where the held-out episodes are like the others, in any unit; at other tempos, about."""
     hand = np.linspace(0, 20, 400)
-    robot = 1000 * np.sin(hand) + 5000
+    robot = 0.001 * np.sin(hand) + 5
     found = evaluate(pairs([np.column_stack([hand, robot])] * 4), (), others={"mean": Mean})
     now = dict(zip(found.conditions, means(found, "now", "mean"), strict=True))
-    assert_allclose([now["as recorded"], now["lost 30 %"]], 1, rtol=1e-12)
+    assert_allclose([now["as recorded"], now["lost 30 %"]], 1, rtol=1e-9)
     still = np.append(robot, np.full(20, robot[133]))  # two seconds more at a third
     assert now["pause 2 s"] == pytest.approx(np.mean((still - robot.mean()) ** 2) / robot.var())
     assert now["fast x2"] == pytest.approx(1, abs=0.01)
@@ -136,9 +137,9 @@ def test_only_what_was_recorded_is_scored(rng):
 
 def test_a_filter_is_scored_as_its_replay(rng):
     demos = dataset(rng, count=4, rate=4.0)
-    found = evaluate(demos, ["bip"], conditions=["pause 2 s"], seed=3, fit=plain, others={})
+    found = evaluate(demos, ["ebip"], conditions=["pause 2 s"], seed=3, fit=plain, others={})
     for i, row in enumerate(found.rows):
-        played = replay(plain(demos.without(i)), warp(demos[i], demos.channels, "pause 2 s"), "bip", seed=3)
+        played = replay(plain(demos.without(i)), warp(demos[i], demos.channels, "pause 2 s"), "ebip", seed=3)
         assert row.fold == i
         assert_allclose([row.now, row.cover, row.nll], [played.now.nmse, played.now.coverage, played.now.nll])
         assert_allclose([row.end25, row.end50, row.end75], [played.final_pose(share) for share in (0.25, 0.5, 0.75)])
@@ -147,11 +148,11 @@ def test_a_filter_is_scored_as_its_replay(rng):
 # ---------------------------------------------------------------------------------------------------------- baselines
 
 
-def first_answers(predictor: object, times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def answers(predictor: Predictor, times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean (T, 2, Dc) and standard deviation of one interaction."""
     step = predictor.begin()
-    answers = [step(float(t), y) for t, y in zip(times, values, strict=True)]
-    return np.array([mean for mean, _ in answers]), np.array([std for _, std in answers])
+    given = [step(float(t), y) for t, y in zip(times, values, strict=True)]
+    return np.array([mean for mean, _ in given]), np.array([std for _, std in given])
 
 
 def test_the_mean_trajectory_is_played_by_the_clock(rng):
@@ -162,7 +163,7 @@ def test_the_mean_trajectory_is_played_by_the_clock(rng):
     demos = inphase.Dataset.from_arrays(times, [np.column_stack([0 * x, x]) for x in lines], ["hand"], ["robot"])
     at = np.array([0.0, 0.3, 1.1, 1.9, 2.0, 7.0])
     shares = np.round(np.minimum(at / 2.0, 1) * (GRID - 1)) / (GRID - 1)
-    mean, std = first_answers(MeanTrajectory.learn(demos), 100 + at, rng.normal(size=(6, 1)))
+    mean, std = answers(MeanTrajectory.learn(demos), 100 + at, rng.normal(size=(6, 1)))
     assert_allclose(mean[:, 0, 0], sizes.mean() * shares, atol=1e-12)
     assert_allclose(std[:, 0, 0], sizes.std() * shares, atol=1e-12)
     assert_allclose(mean[:, 1, 0], sizes.mean())
@@ -185,6 +186,17 @@ def test_ridge_finds_what_the_past_tells_linearly(rng):
     found = evaluate(pairs(follows), (), conditions=AS_RECORDED, others=BASELINES)
     assert means(found, "now", "ridge")[0] < 1e-3
     assert means(found, "now", "mean trajectory")[0] > 0.5
+
+
+def test_a_hand_out_of_sight_is_taken_to_stay_where_it_was(rng):
+    demos = dataset(rng, count=4, rate=10.0)
+    times, shown = np.arange(60) * 0.1, rng.normal(size=(60, 2))
+    gone, still = shown.copy(), shown.copy()
+    gone[20:50, 0], still[20:50, 0] = np.nan, shown[19, 0]
+    ridge = Ridge.learn(demos)
+    one, other = (answers(ridge, times, values) for values in (gone, still))
+    assert_array_equal(one[0], other[0])
+    assert_array_equal(one[1], other[1])
 
 
 def test_a_hand_that_was_never_seen_has_no_influence_on_ridge(rng):
@@ -238,6 +250,24 @@ def test_how_a_turn_is_written_does_not_matter():
         for one, other in zip(smooth.rows, flipped.rows, strict=True):
             assert_allclose(scores(one), scores(other), rtol=1e-6, atol=1e-9)
         assert means(smooth, "now", "ridge")[0] < 0.1
+
+
+def test_errors_are_measured_by_the_spread_that_a_model_learns(rng):
+    """On one branch of the circle, a quaternion's channels together."""
+    for demos in (turning(rng, flip=True), dataset(rng, count=4, rate=10.0)):
+        expected = plain(demos).spread[len(demos.observed) :]
+        assert_allclose(Partners.learn(demos).spread(demos), expected, rtol=1e-12)
+
+
+def test_a_hand_that_goes_round_and_round_is_followed(rng):
+    """Three times round, written between -π and π; the robot goes as far as the hand has gone in all."""
+    gone = [1 + np.linspace(0, 6 * np.pi + rng.random(), 80) for _ in range(5)]
+    values = [np.column_stack([(angle + np.pi) % (2 * np.pi) - np.pi, 2 * angle]) for angle in gone]
+    demos = inphase.Dataset.from_arrays(
+        [0.05 * np.arange(80)] * 5, values, ["hand"], ["robot"], kinds={"hand": "angle"}
+    )
+    found = evaluate(demos, (), conditions=AS_RECORDED)
+    assert means(found, "now", "ridge")[0] < 1e-3
 
 
 @pytest.mark.parametrize(("condition", "factor"), [("slow x2", 0.5), ("fast x2", 2.0)])
@@ -406,15 +436,15 @@ def test_every_episode_is_held_out_once_and_never_learned_from(rng):
         learned.append({d.values.tobytes() for d in train})
         return inphase.fit(train, basis=inphase.basis.Gaussian(5), calibrate=False)
 
-    told: list[tuple[int, int]] = []
-    found = evaluate(demos, ["bip"], folds=3, conditions=AS_RECORDED, fit=fit, progress=lambda *done: told.append(done))
+    told: list[float] = []
+    found = evaluate(demos, ["bip"], folds=3, conditions=AS_RECORDED, fit=fit, progress=told.append)
     assert len(learned) == 3  # once a fold, whatever is made of it
     for row in found.rows:
         i = int(row.episode.split()[1])
         assert row.fold == i % 3
         assert learned[row.fold] == {demos[j].values.tobytes() for j in range(7) if j % 3 != i % 3}
     assert sorted(row.episode for row in found.rows if row.predictor == "bip") == sorted(d.name for d in demos)
-    assert told == [(i, 12) for i in range(1, 13)]
+    assert told == [i / 12 for i in range(1, 13)]
     usual = evaluate(demos, ["bip"], folds=3, conditions=AS_RECORDED, fit=plain)
     assert means(usual, "now", "bip") != means(found, "now", "bip")
 
@@ -560,23 +590,29 @@ def one_blas_thread() -> Iterator[None]:
 
 
 @pytest.mark.parametrize(
-    ("task", "every", "filters"), [("handover", 20, ["rbpf"]), ("nuisi-rocket", 6, ["bip"])]
+    ("folder", "roles", "every", "filter", "conditions"),
+    [
+        ("handover", "HANDOVER", 20, "rbpf", ["as recorded", "pause 2 s"]),
+        ("nuisi/rocket", "NUISI", 6, "bip", list(CONDITIONS)),
+    ],
 )
-def test_it_gives_the_numbers_of_the_script(task, every, filters, score, shared_data):
+def test_it_gives_the_numbers_of_the_script(folder, roles, every, filter, conditions, score, shared_data):
     """On a few real episodes, thinned; the script rounds the constant of the Gaussian density."""
-    observed, controlled, episodes = score.tasks(shared_data)[task]
-    episodes = [tuple(part[::every] for part in episode) for episode in episodes[:4]]
-    folds = [(episodes[1 - k :: 2], episodes[k::2]) for k in (0, 1)]
+    observed, controlled = getattr(score, roles)
+    files = sorted((shared_data / folder).glob("*.csv"))[:4]
+    episodes = [score.read(file, observed, controlled, every) for file in files]
+    splits = {folder: (observed, controlled, [(episodes[1 - k :: 2], episodes[k::2]) for k in (0, 1)])}
     times, values = [t for t, _, _ in episodes], [np.hstack([y, z]) for _, y, z in episodes]
+    demos = inphase.Dataset.from_arrays(times, values, observed, controlled)
     predictors = {"mean trajectory": score.mean_trajectory, "ridge": score.ridge}
-    predictors |= {name: score.inphase_predictor(name) for name in filters}
+    predictors[filter] = score.inphase_predictor(filter)
     with shapes_unchecked(), one_blas_thread():
-        found = evaluate(inphase.Dataset.from_arrays(times, values, observed, controlled), filters, folds=2)
+        found = evaluate(demos, [filter], folds=2, conditions=conditions)
         for name, make in predictors.items():
-            for (_, condition), expected in score.score(
-                make, {task: (observed, controlled, folds)}, verbose=False
-            ).items():
+            rows = score.score(make, splits, conditions, verbose=False)
+            for (_, condition), expected in rows.items():
                 expected["nll"] += 0.5 * np.log(2 * np.pi) - 0.9189
                 for metric in METRICS:
                     figure = found.figure(metric, name, condition)
                     assert figure.mean == pytest.approx(expected[metric], abs=1e-9, rel=1e-9)
+    assert tuple(CONDITIONS) == score.CONDITIONS

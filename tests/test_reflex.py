@@ -64,7 +64,9 @@ def test_it_is_learned_as_ridge_regression(rng: np.random.Generator) -> None:
     x, y = off[:, :-1], off[:, -1]
     beta = np.linalg.solve(x.T @ x + STRENGTH * len(x) * np.eye(x.shape[1]), x.T @ y)
     probe = rng.normal(size=(len(LAGS), 2))
-    expected = rows[:, -1].mean() + rows[:, -1].std() * beta @ ((probe.ravel() - rows[:, :-1].mean(0)) / rows[:, :-1].std(0))
+    expected = rows[:, -1].mean() + rows[:, -1].std() * beta @ (
+        (probe.ravel() - rows[:, :-1].mean(0)) / rows[:, :-1].std(0)
+    )
     seen = np.array([True, True])
     assert_allclose(reflex.answer(probe, seen, reflex.gains(seen)), [expected], rtol=1e-6)
 
@@ -112,9 +114,13 @@ def test_a_memory_forgets_what_nobody_asks_for(rng: np.random.Generator) -> None
 
 def test_two_samples_of_one_time_are_one() -> None:
     both = Memory.empty(2).after(0.0, np.array([0, 1]), np.array([1.0, 2.0]), 1.0)
-    apart = Memory.empty(2).after(0.0, np.array([0]), np.array([1.0]), 1.0).after(0.0, np.array([1]), np.array([2.0]), 1.0)
+    apart = (
+        Memory.empty(2).after(0.0, np.array([0]), np.array([1.0]), 1.0).after(0.0, np.array([1]), np.array([2.0]), 1.0)
+    )
     for memory in (both, apart):
-        assert_allclose(memory.after(1.0, np.array([0]), np.array([3.0]), 1.0).at(np.array([0.0, 0.5])), [[1, 2], [2, 2]])
+        assert_allclose(
+            memory.after(1.0, np.array([0]), np.array([3.0]), 1.0).at(np.array([0.0, 0.5])), [[1, 2], [2, 2]]
+        )
 
 
 # --------------------------------------------------------------------------------------------------------- the session
@@ -146,7 +152,8 @@ def test_the_response_is_linear_in_the_share(model: inphase.Model) -> None:
 def test_at_once_a_whole_share_is_the_regression_and_later_it_is_not(model: inphase.Model) -> None:
     session = played(sharing(model, 1.0))
     reflex, memory, time = session.model.reflex, session._memory, session.time
-    assert reflex is not None and time is not None
+    assert reflex is not None
+    assert time is not None
     seen = np.ones(2, dtype=bool)
     answer = np.zeros((1, 4))
     answer[0, 2:] = reflex.answer(memory.at(time - reflex.lags), seen, reflex.gains(seen))
@@ -159,12 +166,13 @@ def test_at_once_a_whole_share_is_the_regression_and_later_it_is_not(model: inph
 def test_out_of_sight_the_filter_answers_alone(model: inphase.Model) -> None:
     sessions = [played(sharing(model, share)) for share in (0.0, 1.0)]
     apart = []
-    for step in range(12):
+    for _step in range(12):
         for session in sessions:
             session.observe(session.time + 0.08, [np.nan, np.nan])
         off, on = (session.respond(samples=1).mean for session in sessions)
         apart.append(np.abs(off - on).max())
-    assert apart[0] > 0 and apart[-1] == 0
+    assert apart[0] > 0
+    assert apart[-1] == 0
 
 
 def test_a_controlled_channel_that_is_seen_is_left_to_the_filter(model: inphase.Model) -> None:
@@ -175,4 +183,5 @@ def test_a_controlled_channel_that_is_seen_is_left_to_the_filter(model: inphase.
             session.observe(time, {"reach": row[0], "lift": row[1], "grip": row[2]})
         responses.append(session.respond(samples=3).mean)
     grip, turn = (np.abs(responses[1] - responses[0])[:, i] for i in (0, 1))
-    assert (grip == 0).all() and turn[0] > 0
+    assert (grip == 0).all()
+    assert turn[0] > 0

@@ -314,7 +314,7 @@ def test_what_the_robot_does_may_be_seen_too(name: str, model: inphase.Model) ->
     style, rng = np.array([1.5, -1.0]), np.random.default_rng(4)
     times = np.arange(round(1.2 * RATE)) / RATE
     values = curves(times / 2.0, style) + 0.01 * rng.standard_normal((len(times), 4))
-    without, with_grip = model.session(name), model.session(name)
+    without, with_grip = (model.session(name, **MANY.get(name, {})) for _ in range(2))
     watch(without, times, [{"lift": row[1]} for row in values])
     watch(with_grip, times, [{"lift": row[1], "grip": row[2]} for row in values])
     poor, good = without.respond(samples=20, channels="grip"), with_grip.respond(samples=20, channels="grip")
@@ -374,7 +374,7 @@ def test_the_same_seed_and_samples_give_the_same_bytes(name: str, model: inphase
         session = model.session(name, seed=seed)
         runs.append(bytes_of(*watch(session, times, samples), session.respond()))
     assert runs[0] == runs[1]
-    assert (runs[0] == runs[2]) == (name == "bip")  # bip draws nothing
+    assert (runs[0] == runs[2]) == (name in ("bip", "promp"))  # these draw nothing
 
 
 @NAMES
@@ -596,9 +596,11 @@ def test_demonstrations_that_are_all_the_same_are_played_back(name: str) -> None
     values = np.stack([np.sin(times), np.cos(times)], axis=1)
     model = taught(inphase.Dataset.from_arrays([times] * 2, [values] * 2, ["hand"], ["robot"]))
     session = model.session(name)
+    # Doubt about a phase near 1 is all on one side: promp, whose doubt is larger, expects the end a hundredth late.
+    within = 0.03 if name == "promp" else 0.02
     for time, (hand, robot) in zip(times, values, strict=True):
         session.observe(time, [hand])
-        assert session.respond(samples=1).mean[0, 0] == pytest.approx(robot, abs=0.02)
+        assert session.respond(samples=1).mean[0, 0] == pytest.approx(robot, abs=within)
 
 
 @NAMES

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -25,6 +27,18 @@ def samples(count: int, size: int, seed: int) -> np.ndarray:
 
 def sample_cov(rows: np.ndarray) -> np.ndarray:
     return np.cov(rows, rowvar=False).reshape(rows.shape[1], rows.shape[1])
+
+
+def cut(size: int, seed: int) -> tuple[int, ...]:
+    """Features of 1 … size weights, together that many."""
+    ends = np.flatnonzero(np.random.default_rng(seed).random(size - 1) < 0.4) + 1
+    return tuple(np.diff([0, *ends, size]).tolist())
+
+
+def within(blocks: tuple[int, ...]) -> np.ndarray:
+    """(B, B) whether two weights belong to one feature."""
+    feature = [i for i, count in enumerate(blocks) for _ in range(count)]
+    return np.array([[one == other for other in feature] for one in feature])
 
 
 def in_proportion(got: np.ndarray, expected: np.ndarray) -> np.ndarray:
@@ -58,15 +72,55 @@ def test_shrinking_keeps_variances_and_takes_a_share_of_the_rest(
     assert in_proportion(WeightPrior(rows, shrinkage).cov, expected).max() < 1e-9
 
 
-@given(COUNTS, st.integers(2, 12), SEEDS, SHARES, SHARES, st.floats(0, 1))
-def test_trust_is_the_share_of_the_correlation_between_the_partners(
-    count: int, size: int, seed: int, trust: float, shrinkage: float, where: float
+@given(COUNTS, SIZES, SEEDS, SHARES)
+def test_shrinking_takes_a_share_of_what_is_between_features_only(
+    count: int, size: int, seed: int, shrinkage: float
 ) -> None:
-    rows, partner = samples(count, size, seed), round(where * size)
-    expected = WeightPrior(rows, shrinkage).cov
+    rows, blocks = samples(count, size, seed), cut(size, seed)
+    whole = sample_cov(rows)
+    expected = (1 - shrinkage) * whole + shrinkage * whole * within(blocks)
+    assert in_proportion(WeightPrior(rows, shrinkage, blocks=blocks).cov, expected).max() < 1e-9
+
+
+@given(COUNTS, SIZES, SEEDS, SHARES)
+def test_of_one_feature_alone_nothing_shrinks(count: int, size: int, seed: int, shrinkage: float) -> None:
+    rows = samples(count, size, seed)
+    assert in_proportion(WeightPrior(rows, shrinkage, blocks=(size,)).cov, sample_cov(rows)).max() < 1e-9
+
+
+@given(COUNTS, st.integers(2, 12), SEEDS, SHARES, SHARES)
+def test_a_feature_has_no_more_directions_than_demonstrations_or_weights(
+    count: int, size: int, seed: int, shrinkage: float, trust: float
+) -> None:
+    rows, blocks = samples(count, size, seed), cut(size, seed)
+    prior = WeightPrior(rows, shrinkage, trust, sum(blocks[: len(blocks) // 2]), blocks)
+    assert len(prior.factor) <= sum(min(count - 1, own) for own in blocks)
+
+
+@given(COUNTS, st.integers(2, 12), SEEDS, SHARES, SHARES, st.floats(0, 1), st.booleans())
+def test_trust_is_the_share_of_the_correlation_between_the_partners(
+    count: int, size: int, seed: int, trust: float, shrinkage: float, where: float, features: bool
+) -> None:
+    rows, partner, blocks = samples(count, size, seed), round(where * size), cut(size, seed) if features else ()
+    expected = WeightPrior(rows, shrinkage, blocks=blocks).cov
     expected[:partner, partner:] *= trust
     expected[partner:, :partner] *= trust
-    assert in_proportion(WeightPrior(rows, shrinkage, trust, partner).cov, expected).max() < 1e-9
+    assert in_proportion(WeightPrior(rows, shrinkage, trust, partner, blocks).cov, expected).max() < 1e-9
+
+
+@given(COUNTS, st.integers(2, 12), SEEDS, SHARES, SHARES)
+def test_a_feature_that_is_left_out_is_nothing_to_the_others(
+    count: int, size: int, seed: int, shrinkage: float, trust: float
+) -> None:
+    """However much is believed of them, it is the prior of a model without that feature."""
+    rows, blocks = samples(count, size, seed), cut(size, seed)
+    of, shown = np.repeat(np.arange(len(blocks)), blocks), len(blocks) // 2
+    for left_out in range(len(blocks) if len(blocks) > 1 else 0):
+        kept = of != left_out
+        others = tuple(own for i, own in enumerate(blocks) if i != left_out)
+        partner = int((kept & (of < shown)).sum())
+        whole = WeightPrior(rows, shrinkage, trust, sum(blocks[:shown]), blocks).cov[np.ix_(kept, kept)]
+        assert in_proportion(WeightPrior(rows[:, kept], shrinkage, trust, partner, others).cov, whole).max() < 1e-9
 
 
 @pytest.mark.parametrize("trust", [0.0, 0.6, 1.0])
@@ -82,16 +136,20 @@ def test_resampled_partners_are_as_correlated_as_they_are_trusted(trust: float, 
     assert {tuple(row) for row in taken[:, :2]} == {tuple(row) for row in rows[:, :2]}
 
 
-def test_without_demonstrations_that_differ_there_is_no_spread() -> None:
-    prior = WeightPrior(np.ones((3, 4)), 0.5)
+@pytest.mark.parametrize("blocks", [(), (1, 3)])
+def test_without_demonstrations_that_differ_there_is_no_spread(blocks: tuple[int, ...]) -> None:
+    prior = WeightPrior(np.ones((3, 4)), 0.5, blocks=blocks)
     np.testing.assert_array_equal(prior.cov, np.zeros((4, 4)))
     np.testing.assert_array_equal(prior.draw(2, np.random.default_rng(0)), np.ones((2, 4)))
 
 
 @pytest.mark.parametrize("shrinkage", [0.0, 0.4, 1.0])
 @pytest.mark.parametrize("count", [2, 3, 20])
-def test_draws_have_the_mean_and_covariance(count: int, shrinkage: float, rng: np.random.Generator) -> None:
-    prior, draws = WeightPrior(samples(count, 5, 3), shrinkage), 20_000
+@pytest.mark.parametrize("blocks", [(), (3, 2)])
+def test_draws_have_the_mean_and_covariance(
+    count: int, shrinkage: float, blocks: tuple[int, ...], rng: np.random.Generator
+) -> None:
+    prior, draws = WeightPrior(samples(count, 5, 3), shrinkage, blocks=blocks), 20_000
     drawn = prior.draw(draws, rng)
     variances = np.diag(prior.cov)
     # 4.5 standard errors of a mean, and of a covariance: sqrt((Σii Σjj + Σij²) / n).
@@ -143,9 +201,10 @@ def test_drawing_takes_nothing_but_the_seed(count: int, size: int, seed: int) ->
         *[(np.ones((2, 3)), {name: value}) for name in ("shrinkage", "trust") for value in (-0.1, 1.1, np.nan)],
         (np.ones((2, 3)), {"partner": -1}),
         (np.ones((2, 3)), {"partner": 4}),
+        *[(np.ones((2, 3)), {"blocks": blocks}) for blocks in [(2,), (2, 2), (3, 0), (4, -1), (1.5, 1.5)]],
     ],
 )
-def test_what_is_no_prior_is_refused(rows: np.ndarray, options: dict[str, float]) -> None:
+def test_what_is_no_prior_is_refused(rows: np.ndarray, options: dict[str, Any]) -> None:
     with shapes_unchecked(), pytest.raises(OptionError, match="expected"):
         WeightPrior(rows, **options)
 

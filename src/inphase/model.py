@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -125,6 +125,13 @@ class Model:
         var = (self.layout.project_each(at, self.prior.factor, everything) ** 2).sum(1)
         mean, var = self.to_channels(self.layout.predict(at, self.prior.mean), var + self.noise.var)
         return frozen(mean), frozen(np.sqrt(var))
+
+    def starting(self, phase: float, std: float) -> Model:
+        """The same model for interactions that are first seen at `phase`, 0 … 1, give or take `std`; 0.5, 1: anywhere.
+
+        Raises OptionError for a phase that is none, or a standard deviation that is negative or not finite.
+        """
+        return replace(self, phase=self.phase.starting(phase, std))
 
     def to_channels(
         self, mean: Float[np.ndarray, "S F"], var: Float[np.ndarray, "S F"]

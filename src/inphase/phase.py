@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import factorial
 
 import numpy as np
@@ -21,7 +21,7 @@ class PhaseModel:
     mean: (K,) at the start, [1, 1/s, 1/s²][:K]; cov: (K, K). K = order + 1: phase alone, with velocity, with
     acceleration (4.2.7.1). diffusion: spectral density of the noise [1/s^(2 K - 1)]. nominal_velocity: of the
     demonstrations [1/s]. periodic: the phase rolls over from 1 to 0 (4.2.7.3).
-    Raises OptionError for shapes or values that make no prior.
+    Raises OptionError for shapes or values that make no prior, or a mean phase outside 0 … 1.
     """
 
     mean: Float[np.ndarray, " K"]
@@ -51,11 +51,39 @@ class PhaseModel:
             or np.linalg.eigvalsh(self.cov).min() < -1e-12 * scale
         ):
             raise OptionError(f"expected a finite mean and a covariance, got {self.mean.tolist()}, {self.cov.tolist()}")
+        if not 0 <= self.mean[0] <= 1:
+            raise OptionError(f"expected a phase between 0 and 1 at the start, got {self.mean[0]:g}")
 
     @property
     def order(self) -> int:
         """0: phase alone; 1: with velocity; 2: with acceleration."""
         return len(self.mean) - 1
+
+    def starting(self, phase: float, std: float) -> PhaseModel:
+        """The same prior for interactions that begin elsewhere: at `phase`, 0 … 1, give or take `std`.
+
+        Raises OptionError for a phase that is none, or a standard deviation that is negative or not finite.
+        """
+        if not 0 <= std < np.inf:
+            raise OptionError(f"expected a finite standard deviation >= 0 of the phase at the start, got {std}")
+        mean, cov = self.mean.copy(), self.cov.copy()
+        mean[0], cov[0], cov[:, 0] = phase, 0.0, 0.0  # another start says nothing of the tempo
+        cov[0, 0] = std**2
+        return replace(self, mean=mean, cov=cov)
+
+    def starts(self, shares: Float[np.ndarray, " E"]) -> Float[np.ndarray, " E"]:
+        """Quantiles (E,) of the phase at the start, at shares (E,) between 0 and 1: of uniform draws it makes starts.
+
+        Nobody begins outside the interaction: the prior is cut off at 0 and 1. A periodic one is neither cut nor
+        wrapped.
+        """
+        from scipy.special import ndtr, ndtri
+
+        mean, std = self.mean[0], np.sqrt(self.cov[0, 0])
+        if self.periodic:
+            return np.asarray(mean + std * ndtri(shares))
+        low, high = ndtr((np.array([0.0, 1.0]) - mean) / max(std, np.finfo(float).tiny))
+        return np.asarray(np.clip(mean + std * ndtri(low + shares * (high - low)), 0.0, 1.0))  # against rounding alone
 
     def transition(self, dt: float) -> Float[np.ndarray, "K K"]:
         """The phase block of G in Eq. 2.4, dt [s] later: a Taylor step."""

@@ -23,7 +23,6 @@ UNLIKE_ABOVE = 4.0  # squared distance of a reading from what is believed of it,
 UNLIKE_WITHIN = 0.05  # of a typical interaction, the time constant of that average
 NOW = Course(np.ones(1), np.zeros(1))
 FINISHED_AT, AGAIN_BELOW = 0.99, 0.95  # phases where the end is told and taken back: no flicker in between
-PACE = (0.3, 4.0)  # of the typical tempo: between these, noise lasts as long as the interaction goes slowly
 SLOWEST = 0.05  # of the typical tempo: a response to a partner who stands still must end some time
 
 
@@ -162,9 +161,7 @@ class Session:
             phase = model.phase.confine(mean[:1] + self._velocity()[0] * dt)
             near = model.scaling.unscale(model.layout.predict(phase, self._belief.weights_mean)[0])
             values = model.coordinates.sample(sample, near)
-        # A residual belongs to a place in the movement: who moves slowly stays on one side of the others for longer.
-        pace = float(np.clip(self._velocity()[0] / model.phase.nominal_velocity, *PACE))
-        noise_var = model.noise.at((time - self._last_seen) * pace)
+        noise_var = model.noise.at(time - self._last_seen)
         scaled = model.scaling.scale(values)
         # One reading in the wrong unit would move the belief for good. The gate is one of values, not of surprise: a
         # filter that is lost has to hear what surprises it.

@@ -33,7 +33,6 @@ class WeightPrior:
 
     def __post_init__(self) -> None:
         freeze(self, samples=self.samples)
-        object.__setattr__(self, "blocks", tuple(self.blocks))
         if self.samples.ndim != 2 or len(self.samples) < 2 or not np.isfinite(self.samples).all():
             raise OptionError(f"expected finite weights (N, B) of at least 2 demonstrations, got {self.samples.shape}")
         if not 0 <= self.shrinkage <= 1:
@@ -43,6 +42,7 @@ class WeightPrior:
         if not 0 <= self.partner <= self.samples.shape[1]:
             raise OptionError(f"expected partner from 0 to {self.samples.shape[1]} weights, got {self.partner}")
         check_blocks(self.blocks, self.samples.shape[1])
+        object.__setattr__(self, "blocks", tuple(int(count) for count in self.blocks))
 
     @cached_property
     def mean(self) -> Float[np.ndarray, " B"]:

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from inphase.cli.basis_text import show_basis
 from inphase.cli.console import counted
+from inphase.cli.evidence import describe_evidence, summary
 from inphase.model import Model
 from inphase.trajectory import Dataset
 
@@ -56,6 +57,7 @@ def describe_model(model: Model) -> dict[str, Any]:
         "tempo_std": float(phase_std[1] / model.phase.nominal_velocity) if len(phase_std) > 1 else None,
         "order": model.phase.order,
         "periodic": model.phase.periodic,
+        "evidence": describe_evidence(model.evidence),
         "provenance": dict(model.provenance),
         "features": features,
     }
@@ -71,6 +73,7 @@ def print_model(console: Console, model: Model) -> None:
         f"typical duration {card['typical_duration']:.2f} s{tempo}, phase of order {card['order']}"
         f"{', periodic' if card['periodic'] else ''}\n" + _trust_in_words(card["trust"])
     )
+    console.print(summary(model))
     rows = [
         {
             "channel": row["feature"],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
@@ -53,3 +53,18 @@ def waiting(what: str) -> Iterator[None]:
         timer.cancel()
         timer.join()  # it may be about to start
         status.stop()
+
+
+@contextmanager
+def working(what: str) -> Iterator[Callable[[float], None] | None]:
+    """A bar with the time that is left, on standard error if that is a terminal; to be told the share that is done."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Output(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    shown = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), TextColumn("left"))
+    with Progress(*shown, console=console, transient=True) as bar:
+        task = bar.add_task(what, total=1.0)
+        yield lambda share: bar.update(task, completed=share)

@@ -10,8 +10,10 @@ from typing import Annotated
 
 import tyro
 
-from inphase.cli.console import Output
+from inphase.cli.console import Output, working
+from inphase.cli.evidence import summary
 from inphase.cli.follow import follow
+from inphase.cli.jobs import processes
 from inphase.cli.picture import panel
 from inphase.cli.reading import FilterName
 from inphase.cli.scores import LEGEND, ScoreTable, figures
@@ -30,6 +32,7 @@ def demo(
     shapes: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SHAPE...")] = SHAPES,
     filter: FilterName = RECOMMENDED,
     seed: int = 0,
+    calibrate: Annotated[bool, tyro.conf.arg(help_behavior_hint="")] = False,
 ) -> int:
     """Learn from real human handwriting, and follow a hand that was never seen.
 
@@ -38,19 +41,26 @@ def demo(
         shapes: of the LASA handwriting data set
         filter: how phase and weights are inferred
         seed: of the filter's random numbers
+        calibrate: choose noise, tempo and more by held-out demonstrations, as `inphase fit` does: some minutes
     """
     picture = output / "demo.png"
     _check(output, picture, shapes, filter)
     console = Output()
-    console.print("Handwriting: the pen's x is the partner who is seen, its y the robot's answer.\n")
+    console.print("Handwriting: the pen's x is the partner who is seen, its y the robot's answer.")
+    if not calibrate:
+        console.print("To be short, nothing is calibrated by held-out demonstrations: --calibrate does.")
+    console.print()
     table, results, panels = ScoreTable(console, shapes), [], []
     for shape in shapes:
         export_handwriting(shape, output / shape)
         dataset = load(output / shape, observed=["x"], controlled=["y"], units={"*": "mm"})
         last = dataset[-1]
-        model = fit(dataset.without(-1))
+        with working(f"{shape}: learning from {len(dataset) - 1} demonstrations") as progress:
+            model = fit(dataset.without(-1), calibrate=calibrate, jobs=processes(None), progress=progress)
         model.save(output / f"{shape}.inphase")
         console.print(f"{shape}: learned from {len(dataset) - 1} demonstrations, following the one left out")
+        if calibrate:
+            console.print(summary(model), style="dim")
         played, _ = follow(console, model.session(filter, seed), last)
         console.print()
         results.append(figures(model, last, played))
@@ -66,7 +76,7 @@ def demo(
     for words in (
         ["inspect", model_file],
         ["replay", model_file, recordings / f"{last.name}.csv", "--filter", "bip"],
-        ["fit", recordings, "--observed", "x", "--controlled", "y", "--basis", "gaussian:12", "-o", "my.inphase"],
+        ["fit", recordings, "--observed", "x", "--controlled", "y", "--report", "-o", "my.inphase"],
     ):
         console.print(f"  {_program()} {shlex.join(map(str, words))}")
     return 0

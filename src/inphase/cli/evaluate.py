@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
 from inphase.cli.accuracy import LEGEND, accuracy_series, describe_evaluation, print_evaluation
-from inphase.cli.console import Output, counted
+from inphase.cli.console import Output, counted, working
+from inphase.cli.jobs import Jobs, processes
 from inphase.cli.reading import AsJson, Columns, Recordings
 from inphase.errors import DataError, OptionError, listing
 from inphase.evaluation import CONDITIONS
@@ -22,6 +23,7 @@ from inphase.filters import FILTERS, RECOMMENDED
 from inphase.io.atomic import check_target, whole_file
 from inphase.report.accuracy_picture import draw_accuracy
 from inphase.report.replay_picture import check_picture
+from inphase.training import fit
 from inphase.trajectory import Dataset
 
 FilterNames = Annotated[tuple[str, ...], tyro.conf.arg(metavar=f"{'|'.join(FILTERS)}...")]
@@ -36,7 +38,8 @@ def evaluate(
     folds: int = FOLDS,
     conditions: ConditionNames = tuple(CONDITIONS),
     seed: int = 0,
-    jobs: Annotated[int | None, tyro.conf.arg(help_behavior_hint="")] = None,
+    quick: Annotated[bool, tyro.conf.arg(help_behavior_hint="")] = False,
+    jobs: Jobs = None,
     output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], help_behavior_hint="")] = None,
     picture: File = None,
     json_: AsJson = False,
@@ -52,6 +55,7 @@ def evaluate(
         folds: every so many-th episode is held out at a time
         conditions: under which held-out episodes are shown: other tempos, a pause, a partner out of sight
         seed: of the filters' random numbers
+        quick: learn without holding anything out once more, as `inphase fit --quick` does: a second instead of a minute
         jobs: processes that work side by side; otherwise one a processor
         output: write all figures, every episode's too, into this JSON file
         picture: draw errors and coverage into this file (.png, .svg or .pdf)
@@ -62,15 +66,17 @@ def evaluate(
     for path in (output, picture):
         if path is not None:
             check_target(path)
+    side_by_side = processes(jobs)
     tasks = _read(data, columns)
-    with _progress(f"evaluating {counted(sum(map(len, tasks.values())), 'episode')}") as progress:
+    with working(f"evaluating with {counted(sum(map(len, tasks.values())), 'episode')}") as progress:
         evaluation = cross_validate(
             tasks,
             filters,
             folds=folds,
             conditions=conditions,
             seed=seed,
-            jobs=_processors() if jobs is None else jobs,
+            fit=partial(fit, calibrate=not quick),
+            jobs=side_by_side,
             progress=progress,
         )
     found = {"folds": folds, "seed": seed, **describe_evaluation(evaluation)}
@@ -128,24 +134,3 @@ def _names(folders: Sequence[str]) -> list[str]:
         raise OptionError(f"expected every folder once, got twice: {listing(twice)}")
     names = [path.name for path in paths]
     return [name if names.count(name) == 1 else folder for name, folder in zip(names, folders, strict=True)]
-
-
-def _processors() -> int:
-    from joblib import cpu_count  # type: ignore[import-untyped]
-
-    return int(cpu_count())
-
-
-@contextmanager
-def _progress(what: str) -> Iterator[Callable[[int, int], None] | None]:
-    """A bar on standard error, if that is a terminal; to be told how much is done."""
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-    console = Output(stderr=True)
-    if not console.is_terminal:
-        yield None
-        return
-    shown = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*shown, console=console, transient=True) as bar:
-        task = bar.add_task(what)
-        yield lambda done, total: bar.update(task, completed=done, total=total)

@@ -11,13 +11,17 @@ import tyro
 
 from inphase.cli.basis_text import parse_basis
 from inphase.cli.card import describe_model, print_model
-from inphase.cli.console import Output, waiting
+from inphase.cli.console import Output, counted, working
+from inphase.cli.evidence import print_evidence
+from inphase.cli.jobs import Jobs, processes
 from inphase.cli.reading import AsJson, Columns, Recordings
 from inphase.errors import OptionError, listing
 from inphase.io import find_episodes, read_episode
 from inphase.io.atomic import check_target
 from inphase.training import fit as fit_model
 from inphase.training import learn_phase
+
+Flag = Annotated[bool, tyro.conf.arg(help_behavior_hint="")]
 
 
 def fit(
@@ -26,10 +30,15 @@ def fit(
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("model.inphase"),
     basis: Annotated[str | None, tyro.conf.arg(metavar="FAMILY:SIZE", help_behavior_hint="")] = None,
     order: int = 1,
-    periodic: Annotated[bool, tyro.conf.arg(help_behavior_hint="")] = False,
+    periodic: Flag = False,
+    quick: Flag = False,
+    jobs: Jobs = None,
+    report: Flag = False,
     json_: AsJson = False,
 ) -> int:
     """Learn a model from recordings.
+
+    Noise, tempo, uncertainty and more are chosen by playing held-out recordings.
 
     Args:
         data: files, folders or globs of CSV or npz recordings, one episode a file
@@ -38,9 +47,13 @@ def fit(
         basis: basis functions of every channel, such as gaussian:15; otherwise the library's choice
         order: of the phase: 0 alone, 1 with tempo, 2 with a tempo that accelerates
         periodic: an episode is one cycle of an interaction that goes on and on
-        json_: print the model's card as JSON
+        quick: hold nothing out: a second instead of up to a minute, but a model that nobody tested
+        jobs: processes that play held-out recordings side by side; otherwise one a processor
+        report: print all that was tried, and how well each followed the held-out recordings
+        json_: print the model's card, and the report, as JSON
     """
     check_target(output)
+    side_by_side = processes(jobs)
     chosen = parse_basis(basis) if basis is not None else None
     if not (columns.observed and columns.controlled):
         first = read_episode(find_episodes(data)[0], time=columns.time, delimiter=columns.separator)
@@ -49,8 +62,17 @@ def fit(
             f"{first.name} has the channels {listing(first.columns)}"
         )
     dataset = columns.load(data)
-    with waiting(f"learning from {len(dataset)} demonstrations"):
-        model = fit_model(dataset, basis=chosen, phase=learn_phase(dataset, order, periodic))
+    # The usual phase is learned anew for every model that some demonstrations are held out from.
+    phase = None if order == 1 and not periodic else learn_phase(dataset, order, periodic)
+    with working(f"learning from {counted(len(dataset), 'demonstration')}") as progress:
+        model = fit_model(
+            dataset,
+            basis=chosen,
+            phase=phase,
+            calibrate=not quick,
+            jobs=side_by_side,
+            progress=progress,
+        )
     model.save(output)
     if json_:
         json.dump({"model": str(output), **describe_model(model)}, sys.stdout, indent=1)
@@ -58,5 +80,7 @@ def fit(
         return 0
     console = Output()
     print_model(console, model)
+    if report:
+        print_evidence(console, model)
     console.print(f"wrote {output} ({output.stat().st_size / 1e3:.0f} kB)")
     return 0

@@ -31,6 +31,7 @@ def replay(
     filter: FilterName = RECOMMENDED,
     seed: int = 0,
     members: Annotated[int | None, tyro.conf.arg(help_behavior_hint="")] = None,
+    particles: Annotated[int | None, tyro.conf.arg(help_behavior_hint="")] = None,
     picture: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="")] = None,
     json_: AsJson = False,
 ) -> int:
@@ -43,6 +44,7 @@ def replay(
         filter: how phase and weights are inferred
         seed: of the filter's random numbers
         members: the size of the ensemble of ebip; otherwise the filter's choice
+        particles: how many there are of rbpf or particle; otherwise the filter's choice
         picture: draw the first six replays into this file (.png, .svg or .pdf)
         json_: print the figures as JSON
     """
@@ -50,7 +52,8 @@ def replay(
         check_picture(picture)
         check_target(picture)
     trained = Model.load(model)
-    session = trained.session(filter, seed, **({} if members is None else {"members": members}))
+    sizes = {"members": members, "particles": particles}
+    session = trained.session(filter, seed, **{name: size for name, size in sizes.items() if size is not None})
     demonstrations = fitting(trained, Columns(format.time, format.delimiter).load(recordings))
     console, step_by_step = Output(quiet=json_), Output(quiet=json_ or len(demonstrations) > 1)
     table = ScoreTable(console, [d.name for d in demonstrations])

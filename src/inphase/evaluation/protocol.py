@@ -55,14 +55,14 @@ def evaluate(
     fit: Callable[[Dataset], Model] = learn_model,
     others: Mapping[str, Learner] = BASELINES,
     jobs: int = 1,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Callable[[float], object] | None = None,
 ) -> Evaluation:
     """How well filters, and what else is named, follow interactions that they have not seen.
 
     data: one task, or several by name. Episode i is held out in fold i % folds; what is learned from the others by
     `fit` and by `others` (the baselines) is shown the observed channels of each held-out episode, sample by sample,
     under each of the conditions, with the same seed. jobs: so many processes; the rows are the same for any number.
-    progress: called with how many parts of the work are done, of how many. Raises OptionError for unknown names, and
+    progress: is told the share that is done. Raises OptionError for unknown names, and
     DataError where there are too few episodes.
     """
     tasks = {"data": data} if isinstance(data, Dataset) else dict(data)
@@ -178,11 +178,9 @@ def _one_thread() -> Iterator[None]:
         yield
 
 
-def _told(
-    parts: Iterable[Part], before: int, total: int, progress: Callable[[int, int], object] | None
-) -> Iterator[Part]:
+def _told(parts: Iterable[Part], before: int, total: int, progress: Callable[[float], object] | None) -> Iterator[Part]:
     """The parts as they come, each told of."""
     for done, part in enumerate(parts, before + 1):
         if progress is not None:
-            progress(done, total)
+            progress(done / total)
         yield part

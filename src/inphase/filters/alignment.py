@@ -16,7 +16,7 @@ The costs are -2 log densities: exp(-cost / 2) over the open ends is a distribut
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -29,30 +29,42 @@ from inphase.observation import Observation
 CELLS = 400  # of the reference
 TICKS = 100  # of a typical interaction
 FASTEST = 3  # times the nominal tempo: the steepest slope
-STIFFNESS = 25.0  # a whole typical interaction, 20 % off the expected tempo, costs as much as one standard deviation
+STIFFNESS = 16.0  # a whole typical interaction, 25 % off the expected tempo, is one standard deviation off
 WINDOW = 0.3  # of a typical interaction: over so much of a path its tempo is averaged
 MOST_TICKS = 4 * TICKS  # after four whole interactions out of sight nothing is known any more
 TIE = 1e-9  # of two paths that cost the same, the one that moved less in the last tick: rounding must not choose
+NEVER = 1000.0  # typical interactions ago
+LEAST_NEWS = 1e-12  # of a style that was seen a moment ago
 NODES = 20  # open ends that speak for all of them where a response is asked for
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What partners read on the grid of phases, and how far they lie from it. phases: (G,). mean, var: (G, F)."""
+    """What partners read on the grid of phases, how far they lie from it, and for how long.
+
+    phases: (G,). mean, spread: (G, F) mean and variance of the prior. lasting: (F,) of an interaction, for which a
+    partner's own way keeps away from the mean: one over the number of directions that way has (the participation ratio
+    of its covariance between phases), so that a style, too, is no news when it is seen again.
+    """
 
     phases: Float[np.ndarray, " G"]
     mean: Float[np.ndarray, "G F"]
-    var: Float[np.ndarray, "G F"]
+    spread: Float[np.ndarray, "G F"]
+    lasting: Float[np.ndarray, " F"]
 
     def __post_init__(self) -> None:
-        freeze(self, phases=self.phases, mean=self.mean, var=self.var)
+        freeze(self, phases=self.phases, mean=self.mean, spread=self.spread, lasting=self.lasting)
 
     @classmethod
     def of(cls, model: Model) -> Reference:
-        """The mean trajectory of a model, with the variances of its prior and its noise."""
+        """The mean trajectory of a model and its prior's deviations from it."""
         phases = np.linspace(0.0, 1.0, CELLS, endpoint=not model.phase.periodic)
-        spread = (model.layout.project_each(phases, model.prior.factor) ** 2).sum(1)
-        return cls(phases, model.layout.predict(phases, model.prior.mean), spread + model.noise.var)
+        curves = model.layout.project_each(phases, model.prior.factor)
+        spread = (curves**2).sum(1)
+        between = curves.transpose(2, 1, 0) @ curves.transpose(2, 0, 1)  # (F, R, R), with the eigenvalues of (G, G)
+        total = np.maximum(spread.sum(0), np.finfo(float).tiny)
+        lasting = ((between / total[:, None, None]) ** 2).sum((1, 2))
+        return cls(phases, model.layout.predict(phases, model.prior.mean), spread, np.maximum(lasting, 1 / CELLS))
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +73,7 @@ class Alignment:
 
     costs: (G,) of the cheapest path to each cell, beyond that of the cheapest of all. tempos: (G,) [1/s] of these
     paths, averaged over the last window. pending: [s] since the last tick. tempo_var: [1/s²] what is left of the
-    prior's doubt about the tempo.
+    prior's doubt about the tempo. unseen: (F,) [s] since each feature was last seen.
     """
 
     model: Model
@@ -70,9 +82,10 @@ class Alignment:
     tempos: Float[np.ndarray, " G"]
     pending: float
     tempo_var: float
+    unseen: Float[np.ndarray, " F"]
 
     def __post_init__(self) -> None:
-        freeze(self, costs=self.costs - self.costs.min(), tempos=self.tempos)
+        freeze(self, costs=self.costs - self.costs.min(), tempos=self.tempos, unseen=self.unseen)
 
     @classmethod
     def begin(cls, model: Model, reference: Reference) -> Alignment:
@@ -89,6 +102,7 @@ class Alignment:
             tempos=np.full(len(off), np.clip(tempo, 0.0, FASTEST * phase.nominal_velocity)),
             pending=0.0,
             tempo_var=float(phase.cov[1, 1]) if known else 0.0,
+            unseen=np.full(model.layout.count, NEVER / phase.nominal_velocity),
         )
 
     @property
@@ -149,7 +163,7 @@ class Alignment:
             tempos = tempos[here - last]
             tempos = tempos + forgotten * (latest - tempos)
         left = (1 - forgotten) ** (2 * min(int(ticks), MOST_TICKS))
-        return Alignment(self.model, self.reference, costs, tempos, pending, self.tempo_var * left)
+        return Alignment(self.model, self.reference, costs, tempos, pending, self.tempo_var * left, self.unseen + dt)
 
     def seen(self, observation: Observation) -> Alignment:
         """The same open ends after a sample: each pays for how far it lies from the reference, in its metric."""
@@ -158,10 +172,15 @@ class Alignment:
         low = np.minimum(place.astype(np.int64), CELLS - 1)
         high = (low + 1) % CELLS if self.model.phase.periodic else np.minimum(low + 1, CELLS - 1)
         share = (place - low)[:, None]
-        mean, var = (
+        mean, spread = (
             (1 - share) * table[low][:, features] + share * table[high][:, features]
-            for table in (self.reference.mean, self.reference.var)
+            for table in (self.reference.mean, self.reference.spread)
         )
-        news = self.model.noise.var[features] / observation.noise_var
-        costs = self.costs + ((observation.values - mean) ** 2 / var + np.log(var)) @ news
-        return Alignment(self.model, self.reference, costs, self.tempos, self.pending, self.tempo_var)
+        var = spread + self.model.noise.var[features]
+        own = self.unseen[features] * self.model.phase.nominal_velocity / self.reference.lasting[features]
+        news = np.minimum(np.tanh(own), self.model.noise.var[features] / observation.noise_var)
+        repeated = observation.noise_var + spread / np.maximum(news, LEAST_NEWS)
+        costs = self.costs + ((observation.values - mean) ** 2 / repeated + np.log(var) * (var / repeated)).sum(1)
+        unseen = self.unseen.copy()
+        unseen[features] = 0.0
+        return replace(self, costs=costs, unseen=unseen)

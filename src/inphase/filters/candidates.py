@@ -33,17 +33,20 @@ class Candidates:
     def begin(cls, phase: PhaseModel, starts: int, tempos: int) -> Candidates:
         """Quantiles of the phase prior, evenly spaced out to 5 standard deviations; a tempo is not negative.
 
-        Each is as likely as the prior makes its surroundings. The tempos are those of N(tempo | start).
+        Each is as likely as the prior makes its surroundings. The tempos are those of N(tempo | start). Nobody starts
+        outside of 0 … 1.
         """
         from scipy.special import ndtr
 
+        start_std = float(np.sqrt(phase.cov[0, 0]))
+        ends = (np.array([0.0, 1.0]) - phase.mean[0]) / max(start_std, np.finfo(float).tiny)
+        within = (-REACH, REACH) if phase.periodic else np.clip(ends, -REACH, REACH)
         grids, shares = [], []
-        for count in (starts, tempos):
-            edges = np.linspace(-REACH, REACH, count + 1)
+        for count, (low, high) in ((starts, within), (tempos, (-REACH, REACH))):
+            edges = np.linspace(low, high, count + 1)
             grids.append((edges[:-1] + edges[1:]) / 2)
             shares.append(np.diff(ndtr(edges)))
         first, second = (grid.ravel() for grid in np.meshgrid(*grids, indexing="ij"))
-        start_std = float(np.sqrt(phase.cov[0, 0]))
         shared = phase.cov[0, 1] / start_std if start_std > 0 else 0.0
         own = float(np.sqrt(max(phase.cov[1, 1] - shared**2, 0.0)))
         begun = phase.mean[0] + start_std * first

@@ -9,10 +9,14 @@ from inphase.phase import PhaseModel
 
 
 def begin(phase: PhaseModel, count: int, rng: np.random.Generator) -> Float[np.ndarray, "E K"]:
-    """(E, K) `count` draws of [φ, φ̇, …] at the start of an interaction."""
-    drawn = phase.mean + rng.standard_normal((count, len(phase.mean))) @ root(phase.cov).T
-    drawn[:, 0] = phase.confine(drawn[:, 0])
-    return np.asarray(drawn)
+    """(E, K) `count` draws of [φ, φ̇, …] at the start of an interaction, which lies within it."""
+    start = phase.starts(rng.random(count))
+    # Only the phase is cut off: the others are drawn as Gaussians given it.
+    told = phase.cov[1:, 0] / max(phase.cov[0, 0], np.finfo(float).tiny)
+    untold_cov = phase.cov[1:, 1:] - np.outer(told, phase.cov[0, 1:])
+    others = phase.mean[1:] + np.outer(start - phase.mean[0], told)
+    others += rng.standard_normal(others.shape) @ root(untold_cov).T
+    return np.column_stack([phase.confine(start), others])
 
 
 def advance(

@@ -100,7 +100,7 @@ class Promp:
     follows `starts` · `tempos` partners, each with a tempo of its own that never changes, and believes them by their
     likelihood. It is deterministic: the random generator is not used. Raises OptionError.
 
-    With an alignment, each sample is taken in once, at the phase that is the cheapest when it comes. An alignment that
+    With an alignment, each sample is taken in once, at the phase expected when it comes. An alignment that
     changes its mind about the past does not take back what was learned there: a filter looks ahead.
     """
 
@@ -148,7 +148,7 @@ class Promp:
             return belief, StepInfo()
         timing = belief.timing
         phases, weights = timing.phases[timing.nodes], timing.node_weights
-        foreseen = self._innovations(belief, phases, observation)
+        foreseen = self._innovations(belief, phases, observation, np.diag(observation.noise_var))
         if foreseen is None:
             return belief, StepInfo(healthy=False)
         joint = np.log(np.maximum(weights, 1e-300)) + foreseen.log_likelihood
@@ -161,13 +161,28 @@ class Promp:
             timing = timing.weighed(foreseen.log_likelihood)
         else:
             timing = timing.seen(observation)
-            foreseen = self._innovations(belief, np.array([timing.phase]), observation)
+            foreseen = self._aligned(PrompBelief(self.model, timing, belief.means, belief.covs), observation)
             if foreseen is None:
                 return belief, StepInfo(healthy=False)
         return PrompBelief(self.model, timing, *_conditioned(belief, foreseen)), info
 
+    def _aligned(self, belief: PrompBelief, observation: Observation) -> Innovations | None:
+        """The sample at the expected phase; what the doubt about the phase makes of it is one more noise.
+
+        It lasts as long as the other noise, and is repeated as often.
+        """
+        phase = self.model.phase.confine(belief.phase_mean[:1])
+        slope = self.model.layout.slope(phase, belief.weights_mean, observation.features)[0]
+        repeats = observation.noise_var / self.model.noise.var[observation.features]
+        doubt = slope * np.sqrt(belief.phase_cov[0, 0] * repeats)
+        return self._innovations(belief, phase, observation, np.diag(observation.noise_var) + np.outer(doubt, doubt))
+
     def _innovations(
-        self, belief: PrompBelief, phases: Float[np.ndarray, " P"], observation: Observation
+        self,
+        belief: PrompBelief,
+        phases: Float[np.ndarray, " P"],
+        observation: Observation,
+        noise_cov: Float[np.ndarray, "M M"],
     ) -> Innovations | None:
         """The sample as foreseen at each phase; None where it is no reading at any."""
         layout, features = self.model.layout, observation.features
@@ -175,7 +190,6 @@ class Promp:
         plain = layout.predict(phases, self.model.prior.mean, features)
         innovation = observation.values - plain - (belief.means[:, None] @ rows)[:, 0]
         cross = belief.covs @ rows  # Σ Hᵀ
-        noise_cov = np.diag(observation.noise_var)
         cov = rows.transpose(0, 2, 1) @ cross + noise_cov  # S, Eq. 2.7
         try:
             root = np.linalg.cholesky(cov)

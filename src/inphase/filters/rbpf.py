@@ -18,6 +18,7 @@ from inphase.errors import OptionError
 from inphase.filters.belief import Course
 from inphase.filters.filter import StepInfo
 from inphase.filters.gaussian import ABSURD
+from inphase.filters.resampling import effective_size, systematic
 from inphase.filters.tempo import Motion, advance, begin
 from inphase.model import Model
 from inphase.observation import Observation
@@ -97,7 +98,7 @@ class ParticleBelief:
         weights = self.weights
         if len(weights) > most:
             order = np.argsort(self.motion.phase)  # so that those who speak stand where all of them stand
-            speaking = order[_systematic(weights[order], most, 0.5)]
+            speaking = order[systematic(weights[order], most, 0.5)]
             weights = np.full(most, 1 / most)
         confined = self.model.phase.confine(self.motion.phase[speaking, None] * course.share + course.offset)
         phases = confined.reshape(-1)
@@ -204,9 +205,9 @@ class Rbpf:
 def _resampled(belief: ParticleBelief, rng: np.random.Generator) -> ParticleBelief:
     """The belief itself, or, when few particles carry it, as many new ones that weigh the same."""
     count = len(belief.weights)
-    if 1 / (belief.weights**2).sum() >= RESAMPLE_BELOW * count:
+    if effective_size(belief.weights) >= RESAMPLE_BELOW * count:
         return belief
-    kept = _systematic(belief.weights, count, float(rng.random()))
+    kept = systematic(belief.weights, count, float(rng.random()))
     return ParticleBelief(
         belief.model,
         belief.directions,
@@ -215,9 +216,3 @@ def _resampled(belief: ParticleBelief, rng: np.random.Generator) -> ParticleBeli
         belief.means[kept],
         belief.covs[kept],
     )
-
-
-def _systematic(weights: Float[np.ndarray, " P"], count: int, start: float) -> Int[np.ndarray, " Q"]:
-    """`count` particles, each as often as its weight says, give or take one; start in [0, 1) is the first point."""
-    points = (np.arange(count) + start) / count
-    return np.minimum(np.searchsorted(np.cumsum(weights), points), len(weights) - 1)

@@ -43,9 +43,8 @@ class Motion:
 
 def begin(phase: PhaseModel, tempo: Tempo, count: int, rng: np.random.Generator) -> Motion:
     """`count` particles at the start of an interaction."""
-    start = phase.mean[0] + np.sqrt(phase.cov[0, 0]) * rng.standard_normal(count)
     return Motion(
-        phase.confine(start),
+        phase.confine(phase.starts(_shares(count, rng))),
         _mixed(count, tempo.usual, tempo.usual_std, tempo.other_std, rng),
         _mixed(count, tempo.steady, tempo.momentary_std, tempo.other_std, rng),
         np.zeros(count, dtype=bool),
@@ -84,8 +83,13 @@ def _step(motion: Motion, phase: PhaseModel, tempo: Tempo, dt: float, rng: np.ra
 
 
 def _mixed(count: int, share: float, std: float, other_std: float, rng: np.random.Generator) -> Float[np.ndarray, " P"]:
-    """Logarithms of tempo: a share of them narrow, the others wide; stratified, so that few particles cover both."""
+    """Logarithms of tempo: a share of them narrow, the others wide."""
     from scipy.special import ndtri
 
-    normal = ndtri((rng.permutation(count) + rng.random(count)) / count)
+    normal = ndtri(_shares(count, rng))
     return np.asarray(np.where(rng.random(count) < share, std, other_std) * normal)
+
+
+def _shares(count: int, rng: np.random.Generator) -> Float[np.ndarray, " P"]:
+    """Uniform draws, one of each of `count` equal parts of 0 … 1: few particles cover all that is likely."""
+    return np.asarray((rng.permutation(count) + rng.random(count)) / count)

@@ -23,12 +23,15 @@ from inphase.weight_prior import WeightPrior
 
 # What older formats did not have, as they meant it.
 SINCE: dict[int, dict[str, Any]] = {2: {"tempo": {}, "reflex": None, "band": 1.0, "evidence": None}}
+SINCE_WITHIN: dict[int, dict[str, dict[str, Any]]] = {2: {"prior": {"blocks": []}}}  # in entries that they had
 
 
 def renewed(described: dict[str, Any], version: int) -> dict[str, Any]:
     """A header of an older format as one of today's."""
     for since, entries in SINCE.items():
-        described = (entries | described) if version < since else described
+        if version < since:
+            within = {name: more | described[name] for name, more in SINCE_WITHIN[since].items()}
+            described = entries | described | within
     return described
 
 
@@ -69,6 +72,7 @@ def describe(model: Model, arrays: dict[str, Any]) -> dict[str, Any]:
             "shrinkage": model.prior.shrinkage,
             "trust": model.prior.trust,
             "partner": model.prior.partner,
+            "blocks": list(model.prior.blocks),
         },
         "phase": {
             "diffusion": model.phase.diffusion,
@@ -122,6 +126,7 @@ def build(described: dict[str, Any], arrays: dict[str, Any]) -> Model:
             _number(prior["shrinkage"]),
             _number(prior["trust"]),
             _index(prior["partner"], arrays["weights"].shape[-1] + 1),
+            tuple(_index(count, arrays["weights"].shape[-1] + 1) for count in _list(prior["blocks"])),
         ),
         noise=Noise(arrays["noise_var"], arrays["noise_correlation_time"]),
         phase=PhaseModel(
@@ -175,6 +180,12 @@ def _evidence(described: dict[str, Any] | None) -> Evidence | None:
 def _bool(value: object) -> bool:
     if not isinstance(value, bool):
         raise ValueError(f"expected true or false, got {value!r}")
+    return value
+
+
+def _list(value: object) -> list[Any]:
+    if not isinstance(value, list):
+        raise ValueError(f"expected a list, got {value!r}")
     return value
 
 

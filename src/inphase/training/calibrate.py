@@ -1,7 +1,8 @@
 """Calibration: noise, trust, tempo, shrinkage, reflex and band, chosen by held-out demonstrations.
 
 Every choice starts from what was learned without playing anything, and changes only for a candidate that is better by
-more than its standard error: a handful of demonstrations is easily flattered.
+more than its standard error: a handful of demonstrations is easily flattered. What counts is the relative gain, so that
+a condition in which all goes well weighs as much as one in which nothing does.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from inphase.metrics import NINETY, Errors
 from inphase.model import Model
 from inphase.noise import Noise
 from inphase.training.rehearsal import CONDITIONS, Rehearsal, by_the_clock, play, rehearsals, relative, scores
-from inphase.training.shrinkage import oas
+from inphase.training.shrinkage import intensity
 from inphase.training.workers import Run, workers
 from inphase.trajectory import Dataset
 
@@ -51,8 +52,12 @@ def _usual(usual: float) -> Change:
     return lambda model: replace(model, tempo=replace(model.tempo, usual=usual))
 
 
-def _shrunk(rule: Callable[[Float[np.ndarray, "N B"]], float]) -> Change:
-    return lambda model: replace(model, prior=replace(model.prior, shrinkage=rule(model.prior.samples)))
+def _shrunk(shrinkage: str | float) -> Change:
+    def change(model: Model) -> Model:
+        prior = model.prior
+        return replace(model, prior=replace(prior, shrinkage=intensity(shrinkage, prior.samples, prior.blocks)))
+
+    return change
 
 
 def _reflex(share: float) -> Change:
@@ -67,7 +72,7 @@ CHOICES: dict[str, tuple[Candidate, ...]] = {
     "noise lasts": tuple(Candidate(f"{x:g} times as long", _lasting(x)) for x in (2.0,)),
     "trust": tuple(Candidate(f"{x:g}", _trust(x)) for x in (0.0, 0.5)),
     "usual tempo": tuple(Candidate(f"{x:.0%} of interactions", _usual(x)) for x in (0.5, 0.9)),
-    "shrinkage": (Candidate("OAS", _shrunk(oas)),),
+    "shrinkage": (Candidate("0.3 between features", _shrunk(0.3)), Candidate("OAS between features", _shrunk("oas"))),
 }
 
 
@@ -98,15 +103,18 @@ class Calibration:
         """The share of the reflex. The answer is linear in it: the filter alone and the reflex alone tell of all."""
         alone = self._play(_reflex(1.0))
         off, step = self.errors, [b.now - a.now for a, b in zip(self.errors, alone, strict=True)]
-        weight = [1 / (e.spread**2 * e.now.size) for e in off]
+        scale = np.tile(self._by_condition(off).mean(0), len(self._held_out))
+        weight = [1 / (e.spread**2 * e.now.size * of) for e, of in zip(off, scale, strict=True)]
         toward = -sum(float(np.nansum(e.now * s * w)) for e, s, w in zip(off, step, weight, strict=True))
         length = sum(float(np.nansum(s**2 * w)) for s, w in zip(step, weight, strict=True))
         share = float(np.clip(toward / max(length, 1e-300), 0.0, 1.0))
         mixed = [replace(e, now=e.now + share * s) for e, s in zip(off, step, strict=True)]
         mean, doubt = self._gain(mixed)
-        better = mean > doubt
-        for value, errors, chosen in (("0", off, not better), (f"{share:.2f}", mixed, better), ("1", alone, False)):
-            self._note("reflex", value, errors, chosen=chosen)
+        better = share >= 0.005 and mean > doubt
+        self._note("reflex", "0", off, chosen=not better)
+        if share >= 0.005:
+            self._note("reflex", f"{share:.2f}", mixed, chosen=better)
+        self._note("reflex", "1", alone, chosen=False)
         self._changes.append(_reflex(share if better else 0.0))
         self.errors = mixed if better else off
 
@@ -134,15 +142,16 @@ class Calibration:
         return found
 
     def _gain(self, errors: Sequence[Errors]) -> tuple[float, float]:
-        """How much smaller the error is than what is there, by demonstration: the mean and its standard error."""
-        gain = self._by_demonstration(self.errors) - self._by_demonstration(errors)
+        """The share by which the error is smaller than what is there, and its standard error over demonstrations."""
+        there = self._by_condition(self.errors)
+        gain = ((there - self._by_condition(errors)) / np.maximum(there.mean(0), 1e-12)).mean(1)
         return float(gain.mean()), float(gain.std(ddof=1) / np.sqrt(len(gain)))
 
-    def _by_demonstration(self, errors: Sequence[Errors]) -> Float[np.ndarray, " n"]:
-        return np.asarray(np.array([e.scores.nmse for e in errors]).reshape(len(self._held_out), -1).mean(1))
+    def _by_condition(self, errors: Sequence[Errors]) -> Float[np.ndarray, "n C"]:
+        return np.array([e.scores.nmse for e in errors]).reshape(len(self._held_out), -1)
 
     def _note(self, choice: str, value: str, errors: Sequence[Errors], chosen: bool, band: float = 1.0) -> None:
-        found, each = scores(errors, band), self._by_demonstration(errors)
+        found, each = scores(errors, band), self._by_condition(errors).mean(1)
         doubt = float(each.std(ddof=1) / np.sqrt(len(each)))
         self.trials.append(Trial(choice, value, found.nmse, doubt, found.coverage, found.nll, chosen))
 

@@ -52,9 +52,9 @@ def fit(
     (what is left out keeps the default), the scaling of the features, the prior over weights, the observation noise in
     scaled units (else that of the regression, Eq. 2.15, and that of leaving each demonstration out), the phase prior
     (`inphase.learn_phase` makes one of another order, or periodic), how a partner's tempo may differ, and the shrinkage
-    of the prior ("ledoit-wolf", "oas", or 0 … 1). Where there are four demonstrations or more, the rest is calibrated:
-    demonstrations are held out and played, which takes up to a minute; `calibrate=False` leaves that out. jobs: the
-    processes that play. progress: is told the share that is done.
+    of the prior between features ("between", "ledoit-wolf", "oas", or 0 … 1). Where there are four demonstrations or
+    more, the rest is calibrated: demonstrations are held out and played, which takes up to a minute;
+    `calibrate=False` leaves that out. jobs: the processes that play. progress: is told the share that is done.
     Raises DataError for fewer than two demonstrations, no controlled channel, or a channel that never moves;
     ChannelError for a pattern that fits nothing; OptionError for parts that do not fit each other.
     """
@@ -114,9 +114,10 @@ def _learn(
         duration, seen = 1 / phase.nominal_velocity, np.array([np.isfinite(curve).any(0) for curve in scaled])
         left_out = leave_one_out(layout, weights, np.array(shown, dtype=np.float64), duration, seen)
         noise = noise or both(regression_noise(times, residuals(layout, phases, scaled, weights)), left_out.noise)
-        prior = prior or WeightPrior(weights, trust=left_out.trust, partner=layout.slices[shown.index(False)].start)
+        partner, blocks = layout.slices[shown.index(False)].start, tuple(basis.size for basis in layout.bases)
+        prior = prior or WeightPrior(weights, trust=left_out.trust, partner=partner, blocks=blocks)
     if shrinkage is not None:
-        prior = replace(prior, shrinkage=intensity(shrinkage, prior.samples))
+        prior = replace(prior, shrinkage=intensity(shrinkage, prior.samples, prior.blocks))
     return Model(
         channels=dataset.channels,
         coordinates=coordinates,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Float
@@ -14,12 +15,17 @@ from inphase.model import Model
 from inphase.session import Session
 from inphase.trajectory import Dataset, Demonstration
 
+# A demonstration, its number of observed channels, and where something happens, as another partner might move.
+Vary: TypeAlias = Callable[[Demonstration, int, float], Demonstration]
+
 FOLDS = 8  # at most: models that are learned without some of the demonstrations
 PLAYED = 10  # demonstrations at most, evenly from all
 SAMPLES = 40  # of a demonstration as it is played: noise lasts for longer than they lie apart
 PARTICLES = 100
 PAUSE = 0.3  # of a demonstration
-GAP = (0.4, 0.7)  # of a demonstration, out of sight
+GAP = 0.3  # of a demonstration, out of sight
+EARLIEST, LATEST = 0.1, 0.6  # of a demonstration: where a pause or a gap may begin
+GOLDEN = 0.618  # steps of this size, round a circle, fill it evenly
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,10 +48,15 @@ def rehearsals(dataset: Dataset, learn: Callable[[Dataset], Model]) -> list[Rehe
         except DataError:  # a channel that only those demonstrations have: they cannot be held out
             models[fold] = None
     return [
-        Rehearsal(model, tuple(vary(dataset[i], len(dataset.observed)) for vary in CONDITIONS.values()))
-        for i in played
+        Rehearsal(model, tuple(vary(dataset[i], len(dataset.observed), place) for vary in CONDITIONS.values()))
+        for i, place in zip(played, _places(len(played)), strict=True)
         if (model := models[i % folds]) is not None
     ]
+
+
+def _places(count: int) -> list[float]:
+    """Where each demonstration pauses or is out of sight: not all at the same place."""
+    return [EARLIEST + (LATEST - EARLIEST) * (GOLDEN * i % 1.0) for i in range(1, count + 1)]
 
 
 def play(model: Model, demonstration: Demonstration) -> Errors:
@@ -82,18 +93,18 @@ def _thinned(demonstration: Demonstration) -> Demonstration:
     return Demonstration(demonstration.times[kept], demonstration.values[kept], demonstration.name)
 
 
-def _at_speed(factor: float) -> Callable[[Demonstration, int], Demonstration]:
-    def vary(demonstration: Demonstration, shown: int) -> Demonstration:
+def _at_speed(factor: float) -> Vary:
+    def vary(demonstration: Demonstration, shown: int, place: float) -> Demonstration:
         thin = _thinned(demonstration)
         return Demonstration(thin.times[0] + (thin.times - thin.times[0]) / factor, thin.values, thin.name)
 
     return vary
 
 
-def _with_pause(demonstration: Demonstration, shown: int) -> Demonstration:
-    """A third into it both stand still."""
+def _with_pause(demonstration: Demonstration, shown: int, place: float) -> Demonstration:
+    """Both stand still for a while."""
     thin = _thinned(demonstration)
-    begins, pause = len(thin) // 3, PAUSE * thin.duration
+    begins, pause = round(place * (len(thin) - 1)), PAUSE * thin.duration
     count = max(round(PAUSE * len(thin)), 1)
     still = thin.times[begins] + pause * np.arange(1, count + 1) / count
     times = np.concatenate([thin.times[: begins + 1], still, thin.times[begins + 1 :] + pause])
@@ -103,15 +114,15 @@ def _with_pause(demonstration: Demonstration, shown: int) -> Demonstration:
     return Demonstration(times, values, thin.name)
 
 
-def _out_of_sight(demonstration: Demonstration, shown: int) -> Demonstration:
+def _out_of_sight(demonstration: Demonstration, shown: int, place: float) -> Demonstration:
     thin = _thinned(demonstration)
     share = (thin.times - thin.times[0]) / thin.duration
     values = thin.values.copy()
-    values[np.ix_((share > GAP[0]) & (share < GAP[1]), np.arange(shown))] = np.nan
+    values[np.ix_((share >= place) & (share < place + GAP), np.arange(shown))] = np.nan
     return Demonstration(thin.times, values, thin.name)
 
 
-CONDITIONS: dict[str, Callable[[Demonstration, int], Demonstration]] = {
+CONDITIONS: dict[str, Vary] = {
     "as recorded": _at_speed(1.0),
     "half speed": _at_speed(0.5),
     "double speed": _at_speed(2.0),
