@@ -15,8 +15,9 @@ from scipy.stats import norm
 import inphase
 from inphase.channels import make_channels
 from inphase.evaluation import Scores, difference, replay
-from inphase.evaluation.metrics import NINETY
-from inphase.evaluation.replay import MARKS, by_the_clock, fitting
+from inphase.evaluation.replay import MARKS, fitting
+from inphase.metrics import NINETY
+from inphase.training.rehearsal import by_the_clock
 
 NUMBERS = st.floats(-1e3, 1e3)
 

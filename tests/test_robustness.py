@@ -111,8 +111,7 @@ def test_a_partner_may_be_half_or_twice_as_fast(tempo: float, seed: int, model: 
 # --------------------------------------------------------------------------------------------------------- readings
 
 
-@NAMES
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(("name", "seed"), [*[(name, 0) for name in sorted(FILTERS)], ("rbpf", 1)])
 def test_a_lost_sensor_widens_the_prediction_which_then_recovers(name: str, seed: int, model: inphase.Model) -> None:
     begins, ends = 17, 32  # 30 %
     samples, truth = partner(np.arange(COUNT + 1) / COUNT, seed)

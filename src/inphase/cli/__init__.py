@@ -30,6 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str]) -> int:
+    import scipy.linalg  # noqa: F401 - it brings a BLAS of its own, which can be limited once it is there
     import tyro
     from threadpoolctl import threadpool_limits
 

@@ -8,8 +8,8 @@ import numpy as np
 from rich.console import Console
 
 from inphase.cli.scores import figure, percent
-from inphase.evaluation.metrics import Scores
 from inphase.evaluation.replay import Moment, Replay, steps
+from inphase.metrics import Scores
 from inphase.result import Status
 from inphase.session import Session
 from inphase.trajectory import Demonstration

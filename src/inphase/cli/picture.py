@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from inphase.evaluation.metrics import MARKS
 from inphase.evaluation.replay import Replay
+from inphase.metrics import MARKS
 from inphase.model import Model
 from inphase.report.replay_picture import ReplayPanel
 from inphase.trajectory import Demonstration

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from inphase.evaluation.metrics import MARKS
-from inphase.evaluation.replay import Replay, by_the_clock
+from inphase.evaluation.replay import Replay
+from inphase.metrics import MARKS
 from inphase.model import Model
+from inphase.training.rehearsal import by_the_clock
 from inphase.trajectory import Demonstration
 
 Figures = Mapping[str, Any]  # float or None, and what else is told of a replay

@@ -2,11 +2,11 @@
 
 from inphase.evaluation.baselines import BASELINES
 from inphase.evaluation.conditions import CONDITIONS, warp
-from inphase.evaluation.metrics import Errors, Scores, difference
 from inphase.evaluation.predictor import Filtered, Learner, Predictor, play
 from inphase.evaluation.protocol import evaluate
 from inphase.evaluation.replay import Replay, replay
 from inphase.evaluation.results import METRICS, Evaluation, Figure, Row
+from inphase.metrics import Errors, Scores, difference
 
 __all__ = [
     "BASELINES",

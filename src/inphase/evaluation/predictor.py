@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from inphase.arrays import FloatArray
-from inphase.evaluation.metrics import Errors, difference
+from inphase.metrics import Errors, difference
 from inphase.model import Model
 from inphase.trajectory import Dataset, Demonstration
 

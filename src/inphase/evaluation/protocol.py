@@ -62,8 +62,8 @@ def evaluate(
     data: one task, or several by name. Episode i is held out in fold i % folds; what is learned from the others by
     `fit` and by `others` (the baselines) is shown the observed channels of each held-out episode, sample by sample,
     under each of the conditions, with the same seed. jobs: so many processes; the rows are the same for any number.
-    progress: is told the share that is done. Raises OptionError for unknown names, and
-    DataError where there are too few episodes.
+    progress: is told the share that is done. Raises OptionError for unknown names, and DataError where there are too
+    few episodes.
     """
     tasks = {"data": data} if isinstance(data, Dataset) else dict(data)
     conditions, filters = tuple(dict.fromkeys(conditions)), tuple(dict.fromkeys(filters))

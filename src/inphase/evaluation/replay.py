@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from inphase.errors import DataError, listing
-from inphase.evaluation.metrics import MARKS, Errors, Scores, difference
+from inphase.metrics import MARKS, Errors, Scores, difference
 from inphase.model import Model
 from inphase.result import Estimate, Response
 from inphase.session import Session
@@ -83,15 +83,6 @@ def steps(model: Model, demonstration: Demonstration, session: Session) -> Itera
         response = session.respond(samples=2)
         now_error, end_error = (difference(channels, response.mean[i], to) for i, to in ((0, now), (1, truth[-1])))
         yield Moment(estimate, response, now_error, end_error, session.respond() if i in marks else None)
-
-
-def by_the_clock(model: Model, demonstration: Demonstration) -> Scores:
-    """The scores of playing the mean demonstration at its mean tempo, whatever the partner does: what to beat."""
-    count = len(model.observed)
-    phases = np.minimum((demonstration.times - demonstration.times[0]) * model.phase.nominal_velocity, 1.0)
-    mean, std = model.distribution(phases)
-    error = difference(model.channels[count:], mean[:, count:], demonstration.values[:, count:])
-    return Scores.of(error, std[:, count:], model.spread[count:])
 
 
 def fitting(model: Model, dataset: Dataset) -> list[Demonstration]:

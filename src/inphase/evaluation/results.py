@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from inphase.errors import OptionError, listing
-from inphase.evaluation.metrics import MARKS, Errors
+from inphase.metrics import MARKS, Errors
 
 METRICS = ("now", "end25", "end50", "end75", "cover", "nll")
 

@@ -72,7 +72,7 @@ CHOICES: dict[str, tuple[Candidate, ...]] = {
     "noise lasts": tuple(Candidate(f"{x:g} times as long", _lasting(x)) for x in (2.0,)),
     "trust": tuple(Candidate(f"{x:g}", _trust(x)) for x in (0.0, 0.5)),
     "usual tempo": tuple(Candidate(f"{x:.0%} of interactions", _usual(x)) for x in (0.5, 0.9)),
-    "shrinkage": (Candidate("0.3 between features", _shrunk(0.3)), Candidate("OAS between features", _shrunk("oas"))),
+    "shrinkage": (Candidate("0.3 between features", _shrunk(0.3)),),
 }
 
 
