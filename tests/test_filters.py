@@ -21,6 +21,7 @@ from inphase.filters.motion import begin, root
 from inphase.mixture import Mixture
 from inphase.observation import NOTHING, Observation
 from inphase.phase import PhaseModel
+from inphase.tempo import Tempo
 
 Steps = Sequence[tuple[Observation, float]]
 PHASES = pytest.mark.parametrize(("order", "periodic"), [(0, False), (1, False), (2, False), (1, True), (2, True)])
@@ -235,10 +236,10 @@ def test_with_the_phase_known_bip_is_linear_regression(rng: np.random.Generator)
 def test_with_the_phase_known_rbpf_is_linear_regression(
     rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for constant in ("USUAL_STD", "OTHER_STD", "STEADY_STD", "STOP_RATE", "PHASE_JITTER"):
-        monkeypatch.setattr(tempo, constant, 0.0)
+    monkeypatch.setattr(tempo, "PHASE_JITTER", 0.0)
     monkeypatch.setattr(rbpf, "VARIANCE_KEPT", 1.0)
-    model = chance_model(rng, known_phase(0.8, start=0.1))
+    steady = Tempo(usual_std=0.0, other_std=0.0, momentary_std=0.0, stop_rate=0.0)
+    model = dataclasses.replace(chance_model(rng, known_phase(0.8, start=0.1)), tempo=steady)
     steps = samples(model, rng, count=40, mean_dt=0.02)
     mean, cov, log_likelihood = closed_form(model, steps, 0.1, 0.8)
     belief, total = run(make("rbpf", model, particles=10), steps)
