@@ -78,12 +78,9 @@ class Model:
             raise OptionError(f"expected a finite band > 0, got {self.band}")
         if self.reflex is not None:
             shown = sum(self.channels[of[0]].role is Role.OBSERVED for of in self.coordinates.channel_of)
-            numbers = len(self.reflex.lags) * shown + features - shown
-            if (self.reflex.observed, len(self.reflex.mean)) != (shown, numbers):
-                raise OptionError(
-                    f"reflex: expected {shown} observed features and {numbers} numbers, "
-                    f"got {self.reflex.observed} and {len(self.reflex.mean)}"
-                )
+            parts, fitting = (self.reflex.observed, len(self.reflex.mean)), (shown, features - shown)
+            if parts != fitting:
+                raise OptionError(f"reflex: expected {fitting} observed and controlled features, got {parts}")
         if self.phase.periodic != self.layout.periodic:
             raise OptionError(
                 f"expected phase and basis to be both periodic or both not, got phase.periodic={self.phase.periodic} "

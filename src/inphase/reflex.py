@@ -1,84 +1,110 @@
 """What the partner's last moments say of the controlled partner, without any model of time.
 
 A phase model explains a new interaction by those that were demonstrated. How the robot's hand stands to the partner's
-*now* often carries over where the whole course does not, and is not lost when the phase is. So a share of the response
-is a regression on what was just seen; how large it is, held-out demonstrations decide.
+*now* often carries over where the whole course does not, and is not lost when the phase is. So a response is the
+filter's and a regression's on what was just seen, each counting by its precision.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TypeAlias
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from inphase.arrays import freeze
 from inphase.errors import OptionError
 
-Gains: TypeAlias = Float[np.ndarray, "Z M"]
+NEAR = 4  # power of the similarity by which places tell of the error: only those close by
+DOUBT = 3.0  # places' worth of the error everywhere
 
 
 @dataclass(frozen=True, eq=False)
 class Reflex:
-    """A linear regression of the controlled features on the observed ones, now and a little before.
+    """Kernel ridge regression of the controlled features on the observed ones, now and a little before.
 
-    lags: (L,) [s], increasing from 0. mean: (n,), cov: (n, n) of the observed features lag after lag, then of the
-    controlled ones: n = L · Fo + Fc, in scaled units; cov holds the regularisation, too. observed: Fo, the first
-    features of the layout. share: 0 … 1 of the response. fade: [s], over which a response forgets what was seen.
-    Raises OptionError for parts that do not fit each other.
+    A place is how the partner stands and how that changed from lag to lag, less `centre`, over `scale`. The kernel of
+    two places a distance d apart is 1 / (1 + d² / 2 width²), which looks for demonstrations that stood and moved
+    alike, and `trend` times their inner product, which is linear regression.
+
+    lags: (L,) [s], increasing from 0. centre: (L, Fo), scale: (L,). places: (n, L · Fo) of demonstrations. gains:
+    (n, Fc) of the kernels. mean: (Fc,). error_var: (n, Fc) squared error at each place, its demonstration held out.
+    weight: how many times its precision the answer counts, 0 for not at all. fade: [s], over which what was seen goes
+    stale. All in scaled units. Raises OptionError for parts that do not fit each other.
     """
 
     lags: Float[np.ndarray, " L"]
-    mean: Float[np.ndarray, " n"]
-    cov: Float[np.ndarray, "n n"]
-    observed: int
-    share: float
+    centre: Float[np.ndarray, "L Fo"]
+    scale: Float[np.ndarray, " L"]
+    places: Float[np.ndarray, "n P"]
+    gains: Float[np.ndarray, "n Fc"]
+    mean: Float[np.ndarray, " Fc"]
+    error_var: Float[np.ndarray, "n Fc"]
+    width: float
+    trend: float
+    weight: float
     fade: float
 
     def __post_init__(self) -> None:
-        freeze(self, lags=self.lags, mean=self.mean, cov=self.cov)
-        size = len(self.mean)
-        if self.cov.shape != (size, size) or not 0 < self.observed * len(self.lags) < size:
-            raise OptionError(
-                f"reflex: expected mean (n,) and cov (n, n) of more than {self.observed} features at {len(self.lags)} "
-                f"lags, got {self.mean.shape} and {self.cov.shape}"
-            )
+        arrays = {
+            name: getattr(self, name) for name in ("lags", "centre", "scale", "places", "gains", "mean", "error_var")
+        }
+        freeze(self, **arrays)
+        shapes = [self.lags.shape, self.centre.shape, self.scale.shape, self.places.shape]
+        shapes += [self.gains.shape, self.mean.shape, self.error_var.shape]
+        (lags,), (count, controlled), observed = self.lags.shape, self.gains.shape, self.observed
+        expected = [(lags,), (lags, observed), (lags,), (count, lags * observed)]
+        expected += [(count, controlled), (controlled,), (count, controlled)]
+        if shapes != expected or 0 in (lags, observed, count, controlled):
+            raise OptionError(f"reflex: expected arrays of the shapes {expected}, got {shapes}")
         if not (self.lags[0] == 0 and (np.diff(self.lags) > 0).all() and np.isfinite(self.lags).all()):
             raise OptionError(f"reflex: expected lags that increase from 0, got {self.lags.tolist()}")
-        if not (np.isfinite(self.mean).all() and np.isfinite(self.cov).all()):
-            raise OptionError("reflex: expected a finite mean and covariance")
-        if not (0 <= self.share <= 1 and 0 < self.fade < np.inf):
-            raise OptionError(f"reflex: expected a share in 0 … 1 and a fade > 0, got {self.share} and {self.fade}")
+        for name, array in arrays.items():
+            if not np.isfinite(array).all():
+                raise OptionError(f"reflex: expected finite numbers of {name}, got {array}")
+        if not ((self.scale > 0).all() and (self.error_var >= 0).all()):
+            raise OptionError("reflex: expected a positive scale, and errors that are not negative")
+        for name, least in (("width", "> 0"), ("trend", ">= 0"), ("weight", ">= 0"), ("fade", "> 0")):
+            value = getattr(self, name)
+            if not (0 <= value < np.inf and (value > 0 or least == ">= 0")):
+                raise OptionError(f"reflex: expected a finite {name} {least}, got {value}")
+
+    @property
+    def observed(self) -> int:
+        """Fo, the number of observed features."""
+        return int(self.centre.shape[-1])
 
     @property
     def memory(self) -> float:
         """How far back it looks [s]."""
         return float(self.lags[-1])
 
-    def gains(self, seen: Bool[np.ndarray, " Fo"]) -> Gains:
-        """The regression on the features that are seen: one that is not has no influence (DESIGN 4, trap 1)."""
-        if seen.all():
-            return self._gains_of_all
-        return self._gains(seen)
+    def answer(self, moments: Float[np.ndarray, "L Fo"]) -> tuple[Float[np.ndarray, " Fc"], Float[np.ndarray, " Fc"]]:
+        """(Fc,) the controlled features, and the variance of their error, for the observed ones at each lag."""
+        here = place(moments, self.centre, self.scale)
+        alike = similarity(here, self.places, self.width)
+        mean = self.mean + (alike + self.trend * (self.places @ here)) @ self.gains
+        near = alike**NEAR
+        # Where nobody was near, the error is that of everywhere.
+        var = (near @ self.error_var + DOUBT * self.error_var.mean(0)) / (near.sum() + DOUBT)
+        return mean, var
 
-    def answer(
-        self, moments: Float[np.ndarray, "L Fo"], seen: Bool[np.ndarray, " Fo"], gains: Gains
-    ) -> Float[np.ndarray, " Fc"]:
-        """(Fc,) the controlled features, for the observed ones at each lag, and the `gains` of those that are seen."""
-        count = len(self.lags) * self.observed
-        off = (moments.ravel() - self.mean[:count])[np.tile(seen, len(self.lags))]
-        return np.asarray(self.mean[count:] + gains @ off)
 
-    @cached_property
-    def _gains_of_all(self) -> Gains:
-        return self._gains(np.ones(self.observed, dtype=bool))
+def place(
+    moments: Float[np.ndarray, "*n L Fo"], centre: Float[np.ndarray, "L Fo"], scale: Float[np.ndarray, " L"]
+) -> Float[np.ndarray, "*n P"]:
+    """(..., L · Fo) how the partner stands and how that changed from lag to lag; about 1 from the centre."""
+    changes = np.concatenate([moments[..., :1, :], moments[..., :-1, :] - moments[..., 1:, :]], axis=-2)
+    scaled = (changes - centre) / scale[:, None]
+    return np.asarray(scaled.reshape(*scaled.shape[:-2], -1) / np.sqrt(scaled.shape[-1] * scaled.shape[-2]))
 
-    def _gains(self, seen: Bool[np.ndarray, " Fo"]) -> Gains:
-        rows = np.flatnonzero(np.tile(seen, len(self.lags)))
-        controlled = np.arange(len(self.lags) * self.observed, len(self.mean))
-        return np.linalg.solve(self.cov[np.ix_(rows, rows)], self.cov[np.ix_(rows, controlled)]).T
+
+def similarity(
+    here: Float[np.ndarray, "*m P"], there: Float[np.ndarray, "n P"], width: float
+) -> Float[np.ndarray, "*m n"]:
+    """The rational quadratic kernel (of shape 1): 1 for the same place, and far away it still remembers."""
+    apart = (here**2).sum(-1)[..., None] + (there**2).sum(-1) - 2 * here @ there.T
+    return np.asarray(1 / (1 + np.maximum(apart, 0.0) / (2 * width**2)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -126,7 +126,7 @@ class Session:
         duration = ahead / max(velocity, SLOWEST * model.phase.nominal_velocity)
         mean[:, features], var[:, features] = self._belief.trajectory(course, features)
         var[:, features] += model.noise.var[features]
-        mean += self._reflex(course, duration, features, mean[0])
+        self._reflect(course, duration, features, mean, var)
         mean, var = model.to_channels(mean, model.band**2 * var)
         return Response(
             times=(self._time or 0.0) + duration,
@@ -195,33 +195,41 @@ class Session:
             seen, values = used.features[shown], used.values[shown]
             self._memory = self._memory.after(self._time, seen, values, reflex.memory)
 
-    def _reflex(
+    def _reflect(
         self,
         course: Course,
         ahead: Float[np.ndarray, " S"],
         features: Int[np.ndarray, " M"],
-        first: Float[np.ndarray, " F"],
-    ) -> Float[np.ndarray, "S F"]:
-        """How much the reflex moves the response: its share now, less and less the further ahead.
+        mean: Float[np.ndarray, "S F"],
+        var: Float[np.ndarray, "S F"],
+    ) -> None:
+        """Let the reflex have its share of a response: by its precision now, less and less the further ahead.
 
         What has not been seen for a while, or is seen itself, it leaves alone.
         """
-        moved = np.zeros((len(ahead), len(first)))
-        reflex, model, memory = self.model.reflex, self.model, self._memory
-        if reflex is None or reflex.share == 0 or self._time is None or not len(memory.times):
-            return moved
-        age = self._time - memory.last_seen
-        seen = age <= reflex.memory
+        reflex, memory, noise = self.model.reflex, self._memory, self.model.noise
+        if reflex is None or reflex.weight == 0 or self._time is None or not len(memory.times):
+            return
+        last = memory.times[-1]
+        ago, seen = self._time - last, last - memory.last_seen <= reflex.memory
         own = features[(features >= len(self._shown)) & (self._time - self._last_seen[features] > reflex.memory)]
-        if not seen.any() or not len(own):
-            return moved
-        at_once = course.share[0] == 1 and course.offset[0] == 0
-        now = first[own] if at_once else self._belief.trajectory(NOW, own)[0][0]
-        answer = reflex.answer(memory.at(self._time - reflex.lags), seen, reflex.gains(seen))
-        share = reflex.share * np.exp(-age.min() / reflex.fade)
-        lasting = np.maximum(model.noise.correlation_time[own], np.finfo(float).tiny)
-        moved[:, own] = np.exp(-np.abs(ahead)[:, None] / lasting) * share * (answer[own - len(self._shown)] - now)
-        return moved
+        if not len(own):
+            return
+        tempo = self._velocity()[0]
+        moments = memory.at(last - reflex.lags)
+        if not seen.all():  # what is out of sight stands where the filter believes
+            before = Course(np.ones(len(reflex.lags)), -tempo * (ago + reflex.lags))
+            moments[:, ~seen] = self._belief.trajectory(before, self._shown[~seen])[0]
+        answer, error_var = (part[own - len(self._shown)] for part in reflex.answer(moments))
+        then, then_var = (
+            part[0] for part in self._belief.trajectory(Course(np.ones(1), np.array([-tempo * ago])), own)
+        )
+        weighted = reflex.weight * seen.mean() * (then_var + noise.var[own])
+        lasting = np.maximum(noise.correlation_time[own], np.finfo(float).tiny)
+        lost = np.exp(-ago / reflex.fade - np.abs(ahead)[:, None] / lasting)
+        share = lost * weighted / (weighted + error_var)
+        mean[:, own] += share * (answer - then)
+        var[:, own] *= 1 - share
 
     def _course(self, lookahead: float, start: float | None, samples: int) -> Course:
         if not (isinstance(samples, (int, np.integer)) and samples >= 1):

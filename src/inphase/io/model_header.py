@@ -22,6 +22,8 @@ from inphase.tempo import Tempo
 from inphase.weight_prior import WeightPrior
 
 # What older formats did not have, as they meant it.
+REFLEX_ARRAYS = ("lags", "centre", "scale", "places", "gains", "mean", "error_var")
+REFLEX_NUMBERS = ("width", "trend", "weight", "fade")
 SINCE: dict[int, dict[str, Any]] = {2: {"tempo": {}, "reflex": None, "band": 1.0, "evidence": None}}
 SINCE_WITHIN: dict[int, dict[str, dict[str, Any]]] = {2: {"prior": {"blocks": []}}}  # in entries that they had
 
@@ -54,7 +56,7 @@ def arrays_of(model: Model) -> dict[str, Any]:
 def _arrays_of_reflex(reflex: Reflex | None) -> dict[str, Any]:
     if reflex is None:
         return {}
-    return {"reflex_lags": reflex.lags, "reflex_mean": reflex.mean, "reflex_cov": reflex.cov}
+    return {f"reflex_{name}": getattr(reflex, name) for name in REFLEX_ARRAYS}
 
 
 def describe(model: Model, arrays: dict[str, Any]) -> dict[str, Any]:
@@ -80,9 +82,7 @@ def describe(model: Model, arrays: dict[str, Any]) -> dict[str, Any]:
             "periodic": model.phase.periodic,
         },
         "tempo": asdict(model.tempo),
-        "reflex": None
-        if model.reflex is None
-        else {"observed": model.reflex.observed, "share": model.reflex.share, "fade": model.reflex.fade},
+        "reflex": None if model.reflex is None else {name: getattr(model.reflex, name) for name in REFLEX_NUMBERS},
         "band": model.band,
         "evidence": None if model.evidence is None else asdict(model.evidence),
         "provenance": dict(model.provenance),
@@ -148,14 +148,9 @@ def build(described: dict[str, Any], arrays: dict[str, Any]) -> Model:
 def _reflex(described: dict[str, Any] | None, arrays: dict[str, Any]) -> Reflex | None:
     if described is None:
         return None
-    return Reflex(
-        arrays["reflex_lags"],
-        arrays["reflex_mean"],
-        arrays["reflex_cov"],
-        _index(described["observed"], len(arrays["reflex_mean"]) + 1),
-        _number(described["share"]),
-        _number(described["fade"]),
-    )
+    parts: dict[str, Any] = {name: arrays[f"reflex_{name}"] for name in REFLEX_ARRAYS}
+    parts |= {name: _number(described[name]) for name in REFLEX_NUMBERS}
+    return Reflex(**parts)
 
 
 def _evidence(described: dict[str, Any] | None) -> Evidence | None:

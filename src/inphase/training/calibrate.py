@@ -60,8 +60,8 @@ def _shrunk(shrinkage: str | float) -> Change:
     return change
 
 
-def _reflex(share: float) -> Change:
-    return lambda model: replace(model, reflex=replace(model.reflex, share=share) if model.reflex else None)
+def _reflex(weight: float) -> Change:
+    return lambda model: replace(model, reflex=replace(model.reflex, weight=weight) if model.reflex else None)
 
 
 def _banded(band: float) -> Change:
@@ -69,6 +69,7 @@ def _banded(band: float) -> Change:
 
 
 CHOICES: dict[str, tuple[Candidate, ...]] = {
+    "reflex": tuple(Candidate(f"{x:g} times its precision", _reflex(x)) for x in (0.0, 0.3)),
     "noise lasts": tuple(Candidate(f"{x:g} times as long", _lasting(x)) for x in (2.0,)),
     "trust": tuple(Candidate(f"{x:g}", _trust(x)) for x in (0.0, 0.5)),
     "usual tempo": tuple(Candidate(f"{x:.0%} of interactions", _usual(x)) for x in (0.5, 0.9)),
@@ -98,25 +99,6 @@ class Calibration:
         if better:
             self._changes.append(candidates[best].change)
             self.errors = played[best]
-
-    def choose_reflex(self) -> None:
-        """The share of the reflex. The answer is linear in it: the filter alone and the reflex alone tell of all."""
-        alone = self._play(_reflex(1.0))
-        off, step = self.errors, [b.now - a.now for a, b in zip(self.errors, alone, strict=True)]
-        scale = np.tile(self._by_condition(off).mean(0), len(self._held_out))
-        weight = [1 / (e.spread**2 * e.now.size * of) for e, of in zip(off, scale, strict=True)]
-        toward = -sum(float(np.nansum(e.now * s * w)) for e, s, w in zip(off, step, weight, strict=True))
-        length = sum(float(np.nansum(s**2 * w)) for s, w in zip(step, weight, strict=True))
-        share = float(np.clip(toward / max(length, 1e-300), 0.0, 1.0))
-        mixed = [replace(e, now=e.now + share * s) for e, s in zip(off, step, strict=True)]
-        mean, doubt = self._gain(mixed)
-        better = share >= 0.005 and mean > doubt
-        self._note("reflex", "0", off, chosen=not better)
-        if share >= 0.005:
-            self._note("reflex", f"{share:.2f}", mixed, chosen=better)
-        self._note("reflex", "1", alone, chosen=False)
-        self._changes.append(_reflex(share if better else 0.0))
-        self.errors = mixed if better else off
 
     def choose_band(self) -> None:
         """As wide as it takes for nine of ten readings to lie inside."""
@@ -187,7 +169,6 @@ def calibrate(
         calibration = Calibration(held_out, run, tell)
         for name, candidates in choices.items():
             calibration.choose(name, candidates)
-        calibration.choose_reflex()
         calibration.choose_band()
     clock = [by_the_clock(r.model, v).nmse for r in held_out for v in r.variations]
     evidence = Evidence(len(held_out), tuple(CONDITIONS), tuple(calibration.trials), float(np.mean(clock)))

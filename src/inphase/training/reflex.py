@@ -5,44 +5,112 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
-from inphase.reflex import Reflex
+from inphase.reflex import Reflex, place, similarity
 
-LAGS = np.array([0.0, 1 / 6, 1 / 3, 2 / 3])  # [s]: position, and how it came there, within a person's reaction
+LAGS = np.array([0.0, 0.2])  # [s]: where the partner is, and how he came there, within a person's reaction
 SPEEDS = (0.5, 1.0, 2.0)  # at which a partner may move: a regression must not take a slow hand for another place
-STRENGTH = 0.1  # of the ridge, in variances of the features: a few demonstrations say little about many lags
-MOMENTS = 100  # of each demonstration
+PLACES = 1500  # at most, of all demonstrations: as many as a step has time for
+CHOOSING = 600  # of them, by which the kernel is chosen
+WIDTHS, TRENDS, RIDGES = (0.5, 1.0), (0.3, 3.0), (0.1, 0.3, 1.0, 3.0, 10.0)
 FADE = 0.3  # [s]
+GOLDEN = 0.618  # steps of this size, round a circle, fill it evenly
 
 
 def learn_reflex(
     times: Sequence[Float[np.ndarray, " _"]],
     features: Sequence[Float[np.ndarray, "_ F"]],
     observed: int,
-    share: float = 0.0,
+    weight: float = 1.0,
 ) -> Reflex:
-    """The reflex of demonstrations: times (T,) [s] and scaled features (T, F), NaN where not seen, one each."""
-    rows = np.concatenate([_moments(t, f, observed) for t, f in zip(times, features, strict=True)])
-    mean, std = rows.mean(0), np.maximum(rows.std(0), 1e-9)
-    shown = len(LAGS) * observed
-    off = (rows - mean) / std
-    correlation = off.T @ off / len(off)
-    correlation[np.arange(shown), np.arange(shown)] += STRENGTH
-    return Reflex(LAGS, mean, correlation * np.outer(std, std), observed, share, FADE)
+    """The reflex of demonstrations: times (T,) [s] and scaled features (T, F), NaN where not seen, one each.
+
+    The kernel and its ridge are those that foretell demonstrations best from the others.
+    """
+    usual = np.nanmean(np.concatenate(features), axis=0)
+    per_demonstration = max(PLACES // (len(times) * len(SPEEDS)), 1)
+    parts = [
+        _moments(t, f, observed, usual, per_demonstration, i)
+        for i, (t, f) in enumerate(zip(times, features, strict=True))
+    ]
+    of = np.repeat(np.arange(len(parts)), [len(moments) for moments, _ in parts])
+    kept = np.unique(np.linspace(0, len(of) - 1, min(PLACES, len(of))).round().astype(np.int64))
+    moments, answers = (np.concatenate(part)[kept] for part in zip(*parts, strict=True))
+    of = of[kept]
+    centre, scale = np.zeros((len(LAGS), observed)), np.ones(len(LAGS))
+    raw = place(moments, centre, scale).reshape(len(of), len(LAGS), observed) * np.sqrt(centre.size)
+    centre, scale = raw.mean(0), np.maximum(np.sqrt(raw.var(0).mean(1)), 1e-9)
+    places, mean = place(moments, centre, scale), answers.mean(0)
+    off = answers - mean
+    width, trend, ridge = _chosen(places, off, of)
+    inverse = _inverse(places, width, trend, ridge)
+    return Reflex(
+        LAGS,
+        centre,
+        scale,
+        places,
+        gains=inverse @ off,
+        mean=mean,
+        error_var=_held_out(inverse, off, of) ** 2,
+        width=width,
+        trend=trend,
+        weight=weight,
+        fade=FADE,
+    )
 
 
 def _moments(
-    times: Float[np.ndarray, " T"], features: Float[np.ndarray, "T F"], observed: int
-) -> Float[np.ndarray, "_ n"]:
-    """Rows of the observed features at each lag, then the controlled ones now: as many of every demonstration."""
+    times: Float[np.ndarray, " T"],
+    features: Float[np.ndarray, "T F"],
+    observed: int,
+    usual: Float[np.ndarray, " F"],
+    count: int,
+    number: int,
+) -> tuple[Float[np.ndarray, "n L Fo"], Float[np.ndarray, "n Fc"]]:
+    """The observed features at each lag, and the controlled ones: `count` at each speed, at other times in each."""
     curves = []
-    for feature in features.T:
+    for feature, mean in zip(features.T, usual, strict=True):
         seen = np.isfinite(feature)
-        curves.append((times[seen], feature[seen]) if seen.any() else (times[:1], np.zeros(1)))
-    now = np.linspace(times[0], times[-1], MOMENTS)
-    rows = []
-    for speed in SPEEDS:
-        at = [np.interp(now - lag * speed, *curve) for lag in LAGS for curve in curves[:observed]]
-        rows.append(np.stack(at + [np.interp(now, *curve) for curve in curves[observed:]], axis=1))
-    return np.concatenate(rows)
+        curves.append((times[seen], feature[seen]) if seen.any() else (times[:1], np.full(1, mean)))
+    moments, answers = [], []
+    for k, speed in enumerate(SPEEDS):
+        share = (np.arange(count) + (0.5 + GOLDEN * number + k / len(SPEEDS)) % 1.0) / count
+        now = times[0] + share * (times[-1] - times[0])
+        at = [[np.interp(now - lag * speed, *curve) for curve in curves[:observed]] for lag in LAGS]
+        moments.append(np.moveaxis(np.array(at), 2, 0))
+        answers.append(np.stack([np.interp(now, *curve) for curve in curves[observed:]], axis=1))
+    return np.concatenate(moments), np.concatenate(answers)
+
+
+def _chosen(
+    places: Float[np.ndarray, "n P"], off: Float[np.ndarray, "n Fc"], of: Int[np.ndarray, " n"]
+) -> tuple[float, float, float]:
+    """Width, trend and ridge by which demonstrations are foretold best from the others; every feature counts alike."""
+    some = np.unique(np.linspace(0, len(of) - 1, min(CHOOSING, len(of))).round().astype(np.int64))
+    places, of = places[some], of[some]
+    off = off[some] / np.maximum(off.std(0), 1e-9)
+
+    def error(choice: tuple[float, float, float]) -> float:
+        return float((_held_out(_inverse(places, *choice), off, of) ** 2).sum())
+
+    return min(((width, trend, ridge) for width in WIDTHS for trend in TRENDS for ridge in RIDGES), key=error)
+
+
+def _inverse(places: Float[np.ndarray, "n P"], width: float, trend: float, ridge: float) -> Float[np.ndarray, "n n"]:
+    kernel = similarity(places, places, width) + trend * places @ places.T
+    return np.linalg.inv(kernel + ridge * np.eye(len(kernel)))
+
+
+def _held_out(
+    inverse: Float[np.ndarray, "n n"], off: Float[np.ndarray, "n Fc"], of: Int[np.ndarray, " n"]
+) -> Float[np.ndarray, "n Fc"]:
+    """(n, Fc) the error at each place of a regression that has not seen its demonstration.
+
+    Exactly, without learning anew: a part of the data is held out by the inverse of its block of the inverse.
+    """
+    gains, error = inverse @ off, np.empty_like(off)
+    for one in np.unique(of):
+        rows = np.flatnonzero(of == one)
+        error[rows] = np.linalg.solve(inverse[np.ix_(rows, rows)], gains[rows])
+    return error
