@@ -144,6 +144,44 @@ def test_a_wild_sample_outside_the_gate_is_as_good_as_none(name: str, model: inp
     assert one.status[21:] == other.status[21:]
 
 
+@pytest.mark.parametrize(
+    ("size", "channels"), [(0.5, [0]), (-0.5, [1]), (1.5, [1]), (-1.5, [0]), (0.5, [0, 1]), (1.5, [0, 1])]
+)
+def test_one_wild_reading_moves_the_response_by_less_than_its_band(
+    size: float, channels: list[int], model: inphase.Model
+) -> None:
+    """Inside the gate, by half a range and more, in one channel or in both."""
+    samples, _ = partner(np.arange(COUNT + 1) / COUNT, 0)
+    plain = play(model, samples, 0)
+    samples[20, channels] += size * model.scaling.span[channels]
+    struck = play(model, samples, 0)
+    assert (np.abs(struck.mean - plain.mean) < plain.std).all()
+    assert (np.abs(struck.mean - plain.mean)[-10:] < 0.5 * plain.std[-10:]).all()
+    assert np.abs(struck.phase - plain.phase).max() < 0.03
+    assert struck.status[21:] == plain.status[21:]
+    assert struck.status[20] is (Status.REFUSED if len(channels) == 2 else Status.FOLLOWING)
+
+
+@NAMES
+def test_one_wild_reading_derails_no_filter(name: str, model: inphase.Model) -> None:
+    samples, truth = partner(np.arange(COUNT + 1) / COUNT, 1)
+    plain = play(model, samples, 1, name)
+    samples[20] += 0.5 * model.scaling.span[:2]
+    struck = play(model, samples, 1, name)
+    off, plain_off = np.abs(struck.mean - truth).mean(), np.abs(plain.mean - truth).mean()
+    assert off < 1.2 * plain_off + 0.005
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_partner_who_jumps_is_heard_as_soon_as_it_is_no_slip(seed: int, model: inphase.Model) -> None:
+    samples, _ = partner(np.arange(COUNT + 1) / COUNT, seed)
+    samples[20:] += 0.5 * model.scaling.span[:2]
+    status = play(model, samples, seed).status
+    assert {*status[20:22]} == {Status.REFUSED}
+    assert Status.REFUSED not in status[22:30]
+    assert Status.UNLIKE in status[22:25]
+
+
 # ------------------------------------------------------------------------------------------------------ someone else
 
 

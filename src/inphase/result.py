@@ -18,7 +18,7 @@ class Status(str, enum.Enum):
     NOTHING_SEEN = "nothing was seen in this sample: the estimate is a prediction"
     BLIND = "nothing has been seen for long: the estimate is a prediction and drifts"
     UNLIKE = "the partner moves unlike any demonstration: do not trust the response"
-    REFUSED = "the readings lie far outside all demonstrations and were not used: the estimate is a prediction"
+    REFUSED = "the readings lie far from all that is expected and were not used: the estimate is a prediction"
     COLLAPSED = "the sample could not be used: if this goes on, reset the session"
     FINISHED = "the interaction is over"
 

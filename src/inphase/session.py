@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numpy.typing import ArrayLike
 
 from inphase.channels import match
@@ -21,6 +21,9 @@ FAR = 2.0  # ranges beyond all that was demonstrated: no reading of this partner
 BLIND_AFTER = 0.1  # of a typical interaction with nothing seen, and the estimate is called blind
 UNLIKE_ABOVE = 4.0  # squared distance of a reading from what is believed of it, in its variance, averaged; usually ≤ 1
 UNLIKE_WITHIN = 0.05  # of a typical interaction, the time constant of that average
+SURPRISING = 25.0  # squared distance of a reading from what is foreseen of it, in its variance
+SLIP = 0.03  # of a typical interaction: a surprise that is over sooner is a slip of the sensor
+NEXT_SLIP = 0.2  # of a typical interaction after which the next surprise may be one again
 NOW = Course(np.ones(1), np.zeros(1))
 FINISHED_AT, AGAIN_BELOW = 0.99, 0.95  # phases where the end is told and taken back: no flicker in between
 SLOWEST = 0.05  # of the typical tempo: a response to a partner who stands still must end some time
@@ -53,6 +56,7 @@ class Session:
         self._time: float | None = None
         self._last_seen = np.full(self.model.coordinates.count, -np.inf)
         self._last_sight: float | None = None
+        self._surprised = np.full(self.model.coordinates.count, -np.inf)
         self._memory = Memory.empty(len(self._shown))
         self._misfit = 1.0
         self._finished = False
@@ -168,7 +172,22 @@ class Session:
         near = np.abs(scaled - 0.5) <= 0.5 + FAR  # NaN is not near
         self._refused = bool((np.isfinite(scaled) & ~near).any())
         seen = np.flatnonzero(near & np.isfinite(noise_var))
+        slips = self._slips(seen, scaled[seen], time, dt)
+        self._refused |= bool(slips.any())
+        seen = seen[~slips]
         return Observation(seen, scaled[seen], noise_var[seen])
+
+    def _slips(
+        self, features: Int[np.ndarray, " M"], values: Float[np.ndarray, " M"], time: float, dt: float
+    ) -> Bool[np.ndarray, " M"]:
+        """Readings to wait with: who surprises for a moment is the sensor, who goes on surprising is the partner."""
+        if len(features) == 0:
+            return np.zeros(0, dtype=bool)
+        ahead = Course(np.ones(1), np.array([self._velocity()[0] * dt]))
+        surprising = self._distances(ahead, features, values) > SURPRISING
+        begins = surprising & (time - self._surprised[features] > NEXT_SLIP * self._typical_duration)
+        self._surprised[features[begins]] = time
+        return np.asarray(surprising & (time - self._surprised[features] < SLIP * self._typical_duration))
 
     def _remember(self, used: Observation) -> None:
         reflex, shown = self.model.reflex, used.features < len(self._shown)
@@ -233,7 +252,10 @@ class Session:
         velocity, velocity_std = self._velocity()
         if len(observation):
             keep = np.exp(-dt / (UNLIKE_WITHIN * self._typical_duration))
-            self._misfit = keep * self._misfit + (1 - keep) * self._distance(observation)
+            # Not the filter's surprise: correlated noise makes each of many readings count for little there, and a
+            # partner who does something else for a whole interaction surprises no sample in particular.
+            distance = float(self._distances(NOW, observation.features, observation.values).mean())
+            self._misfit = keep * self._misfit + (1 - keep) * distance
         span = model.scaling.span[observation.features]
         return Estimate(
             time=self._time or 0.0,
@@ -246,15 +268,12 @@ class Session:
             status=self._status(observation, info, phase),
         )
 
-    def _distance(self, observation: Observation) -> float:
-        """How far the readings lie from what is believed of them now, squared, in units of their variance.
-
-        Not the filter's surprise: correlated noise makes each of many readings count for little there, and a partner
-        who does something else for a whole interaction surprises no sample in particular.
-        """
-        mean, var = self._belief.trajectory(NOW, observation.features)
-        spread_var = var[0] + self.model.noise.var[observation.features]
-        return float(np.mean((observation.values - mean[0]) ** 2 / spread_var))
+    def _distances(
+        self, course: Course, features: Int[np.ndarray, " M"], values: Float[np.ndarray, " M"]
+    ) -> Float[np.ndarray, " M"]:
+        """How far readings lie from what is believed of them there, squared, in units of their variance."""
+        mean, var = self._belief.trajectory(course, features)
+        return np.asarray((values - mean[0]) ** 2 / (var[0] + self.model.noise.var[features]))
 
     def _status(self, observation: Observation, info: StepInfo, phase: float) -> Status:
         if not info.healthy:
@@ -263,7 +282,7 @@ class Session:
             unseen = (self._time or 0.0) - (self._last_sight or 0.0)
             for_long = unseen > BLIND_AFTER * self._typical_duration
             if self._refused:
-                return Status.UNLIKE if for_long else Status.REFUSED
+                return Status.UNLIKE if for_long or self._misfit > UNLIKE_ABOVE else Status.REFUSED
             return Status.BLIND if for_long else Status.NOTHING_SEEN
         if self._misfit > UNLIKE_ABOVE:
             return Status.UNLIKE
