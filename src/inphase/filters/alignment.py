@@ -6,9 +6,10 @@ end of an interaction as at its start.
 
 The step pattern is asymmetric. In one tick, a hundredth of a typical interaction, a path moves on by 0, 1, … 12 cells,
 four of them being the nominal tempo: it may stand still, never turns back, and goes at most three times as fast. A tick
-costs stiffness / 100 · (slope - expected slope)², slopes being tempos over the nominal one. A path that would go beyond
-the end has arrived there and may stay; in a periodic movement it begins again. Every path pays once for every sample,
-so that open ends can be compared as they are.
+costs as much as its slope, the tempo over the nominal one, is off the expected slope, and less within the slack: most
+go on as they did, and who does not may do anything. A path that would go beyond the end has arrived there and may stay;
+in a periodic movement it begins again. Every path pays once for every sample, so that open ends can be compared as they
+are.
 
 Ticks come from the clock, and a sample weighs as much as it is news (`Noise.at`): the sample rate hardly matters. Costs
 are -2 log densities: exp(-cost / 2) over the open ends is a distribution over the phase.
@@ -30,7 +31,8 @@ from inphase.phase import PhaseModel
 CELLS = 400
 TICKS = 100  # of a typical interaction
 FASTEST = 3  # times the nominal tempo: the steepest slope
-STIFFNESS = 16.0  # a whole typical interaction 25 % off the expected tempo costs as much as one standard deviation
+STIFFNESS = 32.0  # the price of a typical interaction spent one nominal tempo off the expected one
+SLACK = 0.125  # times the nominal tempo: the price grows with the square of what is less, in proportion to what is more
 WINDOW = 0.3  # of a typical interaction: over so much of a path its tempo is averaged, and so long an error lasts
 MOST_TICKS = 4 * TICKS  # after four whole interactions out of sight nothing is known any more
 TIE = 1e-9  # of two paths that cost the same, the one that moved less in the last tick: rounding must not choose
@@ -108,31 +110,37 @@ class Alignment:
 
     def passed(self, dt: float) -> Alignment:
         """The open ends dt [s] later."""
+        tick = 1 / (TICKS * self.model.phase.nominal_velocity)
+        ticks, pending = divmod(self.pending + dt, tick)
+        column = self
+        for _ in range(int(min(ticks, MOST_TICKS))):
+            column = column._ticked()
+        return replace(column, pending=pending, unseen=np.minimum(self.unseen + dt, MOST_TICKS * tick))
+
+    def _ticked(self) -> Alignment:
+        """The open ends a tick later."""
         phase, cell = self.model.phase, float(grid(self.model.phase, CELLS)[1])
-        tick = 1 / (TICKS * phase.nominal_velocity)
-        passed, pending = divmod(self.pending + dt, tick)
-        ticks = int(min(passed, MOST_TICKS))
         steps = np.arange(round(FASTEST / (TICKS * cell)) + 1)
-        rates, expected = steps * cell / tick, self.tempo
-        prices = STIFFNESS / TICKS * ((rates - expected) / phase.nominal_velocity) ** 2
+        rates, expected = steps * cell * TICKS * phase.nominal_velocity, self.tempo
+        off = (rates - expected) / phase.nominal_velocity
+        prices = STIFFNESS / TICKS * (np.hypot(off, SLACK) - SLACK)
+        before = self.costs[-steps[-1] :] if phase.periodic else np.full(steps[-1], np.inf)
+        # paths[j, s] comes to cell j by a step of s cells.
+        paths = np.lib.stride_tricks.sliding_window_view(np.concatenate([before, self.costs]), len(steps))[:, ::-1]
+        paths = paths + prices
+        if not phase.periodic:  # a step to the end stands for all that would go beyond
+            paths[-1] += np.minimum.accumulate(prices[::-1])[::-1] - prices
+        last = (paths + TIE * steps).argmin(1)
+        tempos, latest = self.tempos[np.arange(CELLS) - last], rates[last]
+        if not phase.periodic:
+            latest[-1] = max(latest[-1], expected)  # who has arrived no longer shows a tempo
         forgotten = -np.expm1(-1 / (WINDOW * TICKS))
-        costs, tempos, here = self.costs, self.tempos, np.arange(CELLS)
-        for _ in range(ticks):
-            before = costs[-steps[-1] :] if phase.periodic else np.full(steps[-1], np.inf)
-            # paths[j, s] comes to cell j by a step of s cells.
-            paths = np.lib.stride_tricks.sliding_window_view(np.concatenate([before, costs]), len(steps))[:, ::-1]
-            paths = paths + prices
-            if not phase.periodic:  # a step to the end stands for all that would go beyond
-                paths[-1] += np.minimum.accumulate(prices[::-1])[::-1] - prices
-            costs, last = paths.min(1), (paths + TIE * steps).argmin(1)
-            latest = rates[last]
-            if not phase.periodic:
-                latest[-1] = max(latest[-1], expected)  # who has arrived no longer shows a tempo
-            tempos = tempos[here - last]
-            tempos = tempos + forgotten * (latest - tempos)
-        tempo_var = self.tempo_var * (1 - forgotten) ** (2 * ticks)
-        unseen = np.minimum(self.unseen + dt, MOST_TICKS * tick)
-        return Alignment(self.model, costs, tempos, pending, tempo_var, unseen)
+        return replace(
+            self,
+            costs=paths.min(1),
+            tempos=tempos + forgotten * (latest - tempos),
+            tempo_var=self.tempo_var * (1 - forgotten) ** 2,
+        )
 
     def seen(
         self, observation: Observation, mean: Float[np.ndarray, "P M"], var: Float[np.ndarray, "P M"]

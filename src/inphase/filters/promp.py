@@ -26,6 +26,7 @@ from inphase.observation import Observation
 METHODS = ("alignment", "candidates")
 PHASES = 200  # of the reference
 LEAST_NEWS = 1e-6  # of a doubt that was met a moment ago
+ODD = 9.0  # squared distance of a reading, in its variance, from what is expected where it fits best
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,13 +135,10 @@ class Promp:
             weighed = timing.weighed(foreseen.log_likelihood)
             return PrompBelief(self.model, weighed, foreseen.condition(belief.weights)), info
         aligned = timing.seen(observation, *self._reference(belief, observation))
-        found = PrompBelief(self.model, aligned, belief.weights)
-        doubt = self._doubt(found, observation, timing.unseen)
-        phase = self.model.phase.confine(found.phase_mean[:1])
-        foreseen = foresee(self.model, belief.weights, phase, observation, noise_cov + np.outer(doubt, doubt))
-        if foreseen is None:
+        fitted = self._fitted(PrompBelief(self.model, aligned, belief.weights), observation, timing.unseen)
+        if fitted is None:
             return belief, StepInfo(healthy=False)
-        return PrompBelief(self.model, aligned, foreseen.condition(belief.weights)), info
+        return PrompBelief(self.model, aligned, fitted.condition(belief.weights)), info
 
     def _reference(
         self, belief: PrompBelief, observation: Observation
@@ -158,18 +156,33 @@ class Promp:
         phases, prior = grid(self.model.phase, PHASES), self.model.prior
         return self.model.layout.predict(phases, prior.mean), self.model.layout.project_each(phases, prior.factor)
 
-    def _doubt(
+    def _fitted(
         self, belief: PrompBelief, observation: Observation, unseen: Float[np.ndarray, " F"]
+    ) -> Foreseen | None:
+        """The sample beside what was expected of it at the phase found; what fits nowhere is believed the less."""
+        phase = self.model.phase.confine(belief.phase_mean[:1])
+        doubt = self._doubt(belief, phase, observation, unseen)
+        noise_cov = np.diag(observation.noise_var) + np.outer(doubt, doubt)
+        foreseen = foresee(self.model, belief.weights, phase, observation, noise_cov)
+        if foreseen is None or foreseen.surprise[0] <= ODD * len(observation):
+            return foreseen
+        odd = foreseen.surprise[0] / (ODD * len(observation))
+        return foresee(self.model, belief.weights, phase, observation, odd * noise_cov)
+
+    def _doubt(
+        self,
+        belief: PrompBelief,
+        phase: Float[np.ndarray, " 1"],
+        observation: Observation,
+        unseen: Float[np.ndarray, " F"],
     ) -> Float[np.ndarray, " M"]:
         """(M,) the standard deviation that doubt about the phase gives to each reading: slope times that of the phase.
 
         An error of the phase lasts for about a window: a reading soon after the last one meets the same again.
         """
-        features = observation.features
-        phase = self.model.phase.confine(belief.phase_mean[:1])
-        slope = self.model.layout.slope(phase, belief.weights_mean, features)[0]
-        news = np.tanh(unseen[features] * self.model.phase.nominal_velocity / (2 * WINDOW))
-        news = np.minimum(news, self.model.noise.var[features] / observation.noise_var)
+        slope = self.model.layout.slope(phase, belief.weights_mean, observation.features)[0]
+        news = np.tanh(unseen[observation.features] * self.model.phase.nominal_velocity / (2 * WINDOW))
+        news = np.minimum(news, self.model.noise.var[observation.features] / observation.noise_var)
         return np.asarray(slope * np.sqrt(belief.phase_cov[0, 0] / np.maximum(news, LEAST_NEWS)))
 
 
