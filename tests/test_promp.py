@@ -14,7 +14,7 @@ from scipy.stats import multivariate_normal, truncnorm
 import inphase
 from inphase.errors import OptionError
 from inphase.filters import Course, promp
-from inphase.filters.alignment import CELLS
+from inphase.filters.alignment import CELLS, Alignment
 from inphase.filters.candidates import Candidates
 from inphase.filters.promp import METHODS, Promp, PrompBelief
 from inphase.noise import Noise
@@ -63,11 +63,17 @@ class Batch:
 
     @classmethod
     def of(cls, model: inphase.Model, rows: np.ndarray, y: np.ndarray, noise_cov: np.ndarray) -> Batch:
-        mean, prior_cov = model.prior.samples.mean(0), np.cov(model.prior.samples, rowvar=False)
+        prior = cls.before(model)
+        mean, prior_cov = prior.mean, prior.cov
         cov = rows @ prior_cov @ rows.T + noise_cov
         gain = prior_cov @ rows.T @ np.linalg.inv(cov)
         density = multivariate_normal.logpdf(y, rows @ mean, cov)
         return cls(mean + gain @ (y - rows @ mean), prior_cov - gain @ rows @ prior_cov, density)
+
+    @classmethod
+    def before(cls, model: inphase.Model) -> Batch:
+        """No reading at all."""
+        return cls(model.prior.samples.mean(0), np.cov(model.prior.samples, rowvar=False), 0.0)
 
     def at(self, model: inphase.Model, phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(S, F) mean and variance of the features at phases (S,)."""
@@ -242,6 +248,32 @@ def test_at_the_phases_it_found_an_alignment_is_linear_regression(
 
 
 # ------------------------------------------------------------------------------------------------------------ readings
+
+
+def test_an_alignment_is_with_what_is_expected_of_this_partner_by_now(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The reference and its variance are those of the mean trajectory at first, then those of all readings before."""
+    model = chance_model(rng, phase_model())
+    steps = [step for step in samples(model, rng, 30) if len(step[0])]
+    references, taken, plain, foresee = [], [], Alignment.seen, promp.foresee
+    monkeypatch.setattr(Alignment, "seen", lambda *args: (references.append(args[2:]), plain(*args))[1])
+    monkeypatch.setattr(promp, "foresee", lambda *args: (taken.append(args[2:]), foresee(*args))[1])
+    filter, phases, covs = Promp(model, "alignment"), [], []
+    belief = filter.init(RNG)
+    for i, (observation, dt) in enumerate(steps):
+        belief, _ = filter.step(belief, observation, dt, RNG)
+        if i in (0, 5, len(steps) - 1):
+            batch = (
+                Batch.of(model, *stacked(model, steps[:i], phases)[:2], block_diag(*covs)) if i else Batch.before(model)
+            )
+            (mean, var), seen = references[-1], observation.features
+            expected = batch.at(model, np.linspace(0, 1, len(mean)))
+            np.testing.assert_allclose(mean, expected[0][:, seen], atol=1e-7)
+            np.testing.assert_allclose(var, expected[1][:, seen] + model.noise.var[seen], atol=1e-7)
+        (phase,), _, noise_cov = taken[-1]
+        phases.append(phase)
+        covs.append(noise_cov)
 
 
 @METHOD

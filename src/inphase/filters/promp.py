@@ -84,12 +84,14 @@ class Promp:
 
     phase: "alignment" finds it by incremental open-end dynamic time warping onto the trajectory that is expected of
     this partner by now, at first that of the mean (as in 2.6); "candidates" follows `starts` · `tempos` partners, each
-    with a tempo of its own that never changes, and believes them by their likelihood. It is deterministic: the random
-    generator is not used. Raises OptionError.
+    with a tempo of its own that never changes, and believes them by their likelihood. Alignment is the default: it is
+    quicker, and follows a partner who goes much faster or pauses; candidates are a little better where the tempo is
+    steady and near to the demonstrated one. Both are deterministic: the random generator is not used. Raises
+    OptionError.
 
     With an alignment, each sample is taken in once, at the phase that is expected when it comes. An alignment that
     changes its mind about the past does not take back what was learned there: a filter looks ahead, and what the doubt
-    about the phase makes of a sample was counted as noise.
+    about the phase makes of a sample was counted as noise. What fits nowhere is believed the less the odder it is.
     """
 
     model: Model
