@@ -226,7 +226,8 @@ def test_the_rate_of_a_recording_does_not_matter(name: str, seed: int, learned: 
         assert (np.abs(slower[:, 0] - fastest[:, 0]) <= np.minimum(slower[:, 1], fastest[:, 1])).all()
         # As sure of itself, too: four times the samples do not make twice the certainty. The start is much the same.
         phase_std, velocity_std = (slower[10:, [1, 3]] / fastest[10:, [1, 3]]).T
-        assert ((phase_std > 0.7) & (phase_std < 1.4)).all()
+        # From tick to tick an alignment may go at any slope: right after a sample that says much it is surer than else.
+        assert ((phase_std > (0.6 if name == "promp" else 0.7)) & (phase_std < 1.4)).all()
         assert 0.7 < np.median(velocity_std) < 1.4
     truth = times[::4] / times[-1]
     assert np.abs(fastest[:, 0] - truth).max() < 0.1
@@ -310,8 +311,7 @@ def test_a_hand_that_turns_is_followed(name: str, turns: list, rng: np.random.Ge
     # The weights of a bootstrap filter stay those of demonstrations: it knows no other partner.
     model, (times, values) = taught(turning(turns)), turns[0] if name == "particle" else rotation(rng)
     session, estimates, _ = follow(model, times[:30], list(values[:30, :5]), name)
-    # An alignment with the mean trajectory takes a hand that turns less far for one that is late.
-    assert np.abs(estimates[10:, 0] - (times / times[-1])[10:30]).max() < (0.1 if name == "promp" else 0.05)
+    assert np.abs(estimates[10:, 0] - (times / times[-1])[10:30]).max() < 0.05
     # The last two fifths, in phase with what really came; the palm is compared as rotations.
     response = session.respond(samples=21, channels=[*ROBOT, *HAND])
     real = np.stack([np.interp(response.phases, times / times[-1], np.unwrap(v)) for v in values.T], axis=1)
