@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -33,8 +34,10 @@ def shapes_unchecked() -> Iterator[None]:
 
 
 def taught(demos: inphase.Dataset, **options: Any) -> inphase.Model:
-    """A model of all that can be learned without playing held-out demonstrations, which takes its time."""
-    return inphase.fit(demos, calibrate=False, **options)
+    """A model of all that is learned without playing held-out demonstrations, whose responses are the filter's own."""
+    model = inphase.fit(demos, calibrate=False, **options)
+    assert model.reflex is not None
+    return replace(model, reflex=replace(model.reflex, weight=0.0))
 
 
 def curves(phases: np.ndarray, style: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from inphase.errors import OptionError
 from inphase.evidence import Evidence, Trial
 from inphase.metrics import Errors
 from inphase.training import rehearsal
-from inphase.training.calibrate import Calibration, Candidate
+from inphase.training.calibrate import CHOICES, Calibration, Candidate
 from inphase.training.rehearsal import CONDITIONS, Rehearsal, play, rehearsals, relative
 from inphase.training.workers import workers
 
@@ -33,26 +33,23 @@ def model(demos: inphase.Dataset) -> inphase.Model:
 
 
 class Stage:
-    """Plays that cost nothing: the errors depend on the model's usual tempo and the share of its reflex alone."""
+    """Plays that cost nothing: the errors depend on the model's usual tempo and the weight of its reflex alone."""
 
     def __init__(
-        self, model: inphase.Model, size: dict[float, float], toward: float = 0.0, doubt: float = 0.01
+        self, model: inphase.Model, size: dict[float, float], reflex: float = 0.0, doubt: float = 0.01
     ) -> None:
         rng = np.random.default_rng(5)
         still = inphase.Demonstration(np.arange(3.0), np.zeros((3, 4)))  # nobody looks at it
         self.held_out = [Rehearsal(model, (still,) * 3) for _ in range(6)]
         self.noise = rng.normal(size=(18, SAMPLES, CHANNELS))
-        self.other = rng.normal(size=(18, SAMPLES, CHANNELS))
         self.luck = doubt * rng.normal(size=(18, 1, 1))
-        self.size, self.toward = size, toward
+        self.size, self.reflex = size, reflex
 
     def run(self, function: object, tasks: Iterable[tuple]) -> list[Errors]:
         played = []
         for i, (model, _) in enumerate(tasks):
-            size = self.size[model.tempo.usual] * (1 + (self.luck[i] if model.tempo.usual != 0.7 else 0))
-            error = size * self.noise[i]
-            step = self.toward * (0.5 * self.other[i] - self.noise[i])
-            error = error + model.reflex.share * step
+            size = self.size[model.tempo.usual] * (1 + (self.luck[i] if model.tempo.usual != 0.8 else 0))
+            error = size * self.noise[i] * (1 + self.reflex * model.reflex.weight)
             flat = np.full_like(error, 1.0)
             played.append(Errors(error, flat, np.full_like(error, np.nan), np.ones(CHANNELS)))
         return played
@@ -67,7 +64,7 @@ def staged(model: inphase.Model, stage: Stage) -> Calibration:
 
 
 def test_what_is_clearly_better_is_chosen(model: inphase.Model) -> None:
-    calibration = staged(model, Stage(model, {0.7: 1.0, 0.5: 0.9, 0.9: 0.8}))
+    calibration = staged(model, Stage(model, {0.8: 1.0, 0.5: 0.9, 0.9: 0.8}))
     calibration.choose("usual tempo", [usual(0.5), usual(0.9)])
     assert calibration.applied(model).tempo.usual == 0.9
     assert [t.value for t in calibration.trials if t.chosen] == ["as learned", "0.9"]
@@ -76,43 +73,24 @@ def test_what_is_clearly_better_is_chosen(model: inphase.Model) -> None:
 def test_what_is_better_by_chance_alone_is_not(model: inphase.Model) -> None:
     chosen = []
     for size in (1.0, 0.995):
-        calibration = staged(model, Stage(model, {0.7: 1.0, 0.5: size}, doubt=0.2))
+        calibration = staged(model, Stage(model, {0.8: 1.0, 0.5: size}, doubt=0.2))
         calibration.choose("usual tempo", [usual(0.5)])
         chosen.append(calibration.applied(model).tempo.usual)
-    assert chosen == [0.7, 0.7]
+    assert chosen == [0.8, 0.8]
 
 
-def test_the_share_of_the_reflex_is_the_best_there_is(model: inphase.Model) -> None:
-    """Against every share on a grid, each with plays of its own."""
-    stage = Stage(model, {0.7: 1.0}, toward=1.0)
-    calibration = staged(model, stage)
-    calibration.choose_reflex()
-    found = calibration.applied(model)
-    assert found.reflex is not None
-    assert 0 < found.reflex.share < 1
-
-    def error(share: float) -> float:
-        shared = replace(model, reflex=replace(model.reflex, share=share))
-        each = np.array([e.scores.nmse for e in stage.run(None, [(shared, None)] * 18)]).reshape(6, 3)
-        return float((each / alone.mean(0)).mean())
-
-    alone = np.array([e.scores.nmse for e in stage.run(None, [(model, None)] * 18)]).reshape(6, 3)
-
-    errors = [error(share) for share in np.linspace(0, 1, 101)]
-    assert abs(found.reflex.share - np.argmin(errors) / 100) <= 0.01
-
-
-def test_a_reflex_that_says_nothing_gets_no_share(model: inphase.Model) -> None:
-    stage = Stage(model, {0.7: 1.0}, toward=1.0)
-    stage.other, stage.noise = 2 * stage.other + 2 * stage.noise, stage.noise  # the step is noise, and away from it
-    calibration = staged(model, stage)
-    calibration.choose_reflex()
-    assert calibration.applied(model).reflex.share == 0  # type: ignore[union-attr]
+@pytest.mark.parametrize(("worse", "kept"), [(0.5, 0.0), (-0.2, 1.0)])
+def test_a_reflex_that_misleads_is_dropped(worse: float, kept: float, model: inphase.Model) -> None:
+    assert model.reflex is not None
+    model = replace(model, reflex=replace(model.reflex, weight=1.0))
+    calibration = staged(model, Stage(model, {0.8: 1.0}, reflex=worse))
+    calibration.choose("reflex", CHOICES["reflex"])
+    assert calibration.applied(model).reflex.weight == kept  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("size", [0.5, 1.0, 2.0])
 def test_the_band_holds_nine_of_ten(size: float, model: inphase.Model) -> None:
-    calibration = staged(model, Stage(model, {0.7: size}))
+    calibration = staged(model, Stage(model, {0.8: size}))
     calibration.choose_band()
     assert_allclose(calibration.applied(model).band, size, rtol=0.1)  # the errors are normal, with that deviation
     assert_allclose(calibration.trials[-1].coverage, 0.9, atol=2 / (18 * SAMPLES * CHANNELS))

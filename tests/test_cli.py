@@ -451,7 +451,7 @@ def test_the_card_tells_what_the_model_has(calibrated):
     chosen = dict(re.findall(r"(usual tempo|reflex|band) ([\d.]+)", " ".join(lines[at:end])))
     assert model.reflex is not None
     assert float(chosen["band"]) == pytest.approx(model.band, abs=6e-3)
-    assert float(chosen.get("reflex", 0)) == pytest.approx(model.reflex.share, abs=6e-3)
+    assert float(chosen.get("reflex", 1)) == pytest.approx(model.reflex.weight)
     assert float(chosen.get("usual tempo", 100 * usual)) == pytest.approx(100 * model.tempo.usual)
     evidence = model.evidence
     assert evidence is not None

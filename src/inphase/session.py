@@ -228,8 +228,9 @@ class Session:
         lasting = np.maximum(noise.correlation_time[own], np.finfo(float).tiny)
         lost = np.exp(-ago / reflex.fade - np.abs(ahead)[:, None] / lasting)
         share = lost * weighted / (weighted + error_var)
+        # The variance of a mixture of both: their errors have much in common, and where they disagree, who knows?
+        var[:, own] += share * (error_var - var[:, own]) + share * (1 - share) * (answer - then) ** 2
         mean[:, own] += share * (answer - then)
-        var[:, own] *= 1 - share
 
     def _course(self, lookahead: float, start: float | None, samples: int) -> Course:
         if not (isinstance(samples, (int, np.integer)) and samples >= 1):

@@ -19,14 +19,14 @@ class Tempo:
     Rates are per typical interaction. Raises OptionError for shares outside 0 … 1, or negative numbers.
     """
 
-    usual: float = 0.7
+    usual: float = 0.8
     usual_std: float = 0.05
     other_std: float = 0.5  # half and double lie at 1.4 standard deviations
     change_rate: float = 0.5
     steady: float = 0.9
     momentary_std: float = 0.05
     stretch_rate: float = 7.0
-    stop_rate: float = 0.5
+    stop_rate: float = 0.2
     go_rate: float = 7.0
 
     def __post_init__(self) -> None:

@@ -25,7 +25,7 @@ MEANING = {
     "trust": "in what the partner's movement tells beyond its timing; 0: timing alone",
     "usual tempo": "how many interactions go at the tempo of the demonstrations",
     "shrinkage": "how much of the covariance between channels is taken for chance",
-    "reflex": "share of the response that follows the partner's last moments alone",
+    "reflex": "how much counts what the partner's last moments say by themselves",
     "band": "set so that nine of ten held-out readings lie in the 90 % band",
 }
 HOW = """\
@@ -95,6 +95,7 @@ def _value(trial: Trial, model: Model) -> str:
     if trial.value != UNCHANGED:
         return _spaced(trial.value)
     known = {
+        "reflex": f"{model.reflex.weight if model.reflex else 0:g} times its precision",
         "trust": f"{model.prior.trust:.2g}",
         "usual tempo": f"{percent(model.tempo.usual)} of interactions",
         "shrinkage": f"{model.prior.shrinkage:.2g}",

@@ -145,11 +145,12 @@ class Rbpf:
     def init(self, rng: np.random.Generator) -> ParticleBelief:
         """The prior: every particle knows as little of the weights as the others."""
         size = len(self.directions.rows)
+        motion, log_weights = begin(self.model.phase, self.model.tempo, self.particles, rng)
         return ParticleBelief(
             self.model,
             self.directions,
-            np.zeros(self.particles),
-            begin(self.model.phase, self.model.tempo, self.particles, rng),
+            log_weights,
+            motion,
             np.zeros((self.particles, size)),
             np.tile(np.eye(size), (self.particles, 1, 1)),
         )

@@ -12,6 +12,7 @@ from inphase.tempo import Tempo
 
 LONGEST_STEP = 0.02  # of a typical interaction: a long gap is crossed in several
 MOST_STEPS = 200  # after four whole interactions out of sight nothing is known any more
+REACH = 2.5  # standard deviations of other tempos that particles start with
 PHASE_JITTER = 0.005  # after a typical interaction, so that particles that were copied part
 
 
@@ -41,14 +42,29 @@ class Motion:
         return np.where(self.waiting, 0.0, phase.nominal_velocity * np.exp(self.own + self.momentary))
 
 
-def begin(phase: PhaseModel, tempo: Tempo, count: int, rng: np.random.Generator) -> Motion:
-    """`count` particles at the start of an interaction."""
-    return Motion(
+def begin(
+    phase: PhaseModel, tempo: Tempo, count: int, rng: np.random.Generator
+) -> tuple[Motion, Float[np.ndarray, " P"]]:
+    """`count` particles at the start of an interaction, and the logarithms of their weights.
+
+    Half of them go at other tempos than the usual, evenly spread, and their weights make up for it: whether a partner
+    who is twice as fast is found must not hang on the luck of the few that a draw would give.
+    """
+    from scipy.special import ndtri
+
+    usual = round(count * (tempo.usual if tempo.usual in (0.0, 1.0) else 0.5))
+    spread = REACH * (2 * _shares(count - usual, rng) - 1)
+    own = np.concatenate([tempo.usual_std * ndtri(_shares(usual, rng)), tempo.other_std * spread])
+    likely = np.concatenate([np.ones(usual), np.exp(-0.5 * spread**2)])
+    share = np.repeat([tempo.usual, 1 - tempo.usual], [usual, count - usual])
+    total = np.repeat([likely[:usual].sum(), likely[usual:].sum()], [usual, count - usual])
+    motion = Motion(
         phase.confine(phase.starts(_shares(count, rng))),
-        _mixed(count, tempo.usual, tempo.usual_std, tempo.other_std, rng),
+        own,
         _mixed(count, tempo.steady, tempo.momentary_std, tempo.other_std, rng),
         np.zeros(count, dtype=bool),
     )
+    return motion, np.log(share * likely / total)
 
 
 def advance(motion: Motion, phase: PhaseModel, tempo: Tempo, dt: float, rng: np.random.Generator) -> Motion:

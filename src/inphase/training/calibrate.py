@@ -72,7 +72,7 @@ CHOICES: dict[str, tuple[Candidate, ...]] = {
     "reflex": tuple(Candidate(f"{x:g} times its precision", _reflex(x)) for x in (0.0, 0.3)),
     "noise lasts": tuple(Candidate(f"{x:g} times as long", _lasting(x)) for x in (2.0,)),
     "trust": tuple(Candidate(f"{x:g}", _trust(x)) for x in (0.0, 0.5)),
-    "usual tempo": tuple(Candidate(f"{x:.0%} of interactions", _usual(x)) for x in (0.5, 0.9)),
+    "usual tempo": tuple(Candidate(f"{x:.0%} of interactions", _usual(x)) for x in (0.5, 0.95)),
     "shrinkage": (Candidate("0.3 between features", _shrunk(0.3)),),
 }
 
@@ -152,7 +152,7 @@ def calibrate(
     learn: makes a model of a part of the data set. jobs: processes. progress: is told the share that is done.
     """
     choices = {name: candidates for name, candidates in CHOICES.items() if name not in fixed}
-    steps = 3 + sum(len(candidates) for candidates in choices.values())
+    steps = 2 + sum(len(candidates) for candidates in choices.values())
     done = 0
 
     def tell() -> None:
