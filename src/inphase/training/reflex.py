@@ -12,7 +12,8 @@ from inphase.reflex import Reflex, place, similarity
 LAGS = np.array([0.0, 0.2])  # [s]: where the partner is, and how he came there, within a person's reaction
 SPEEDS = (0.5, 1.0, 2.0)  # at which a partner may move: a regression must not take a slow hand for another place
 PLACES = 1500  # at most, of all demonstrations: as many as a step has time for
-CHOOSING = 600  # of them, by which the kernel is chosen
+MOMENTS = 25  # at most, of a demonstration at each speed: more of them say the same
+CHOOSING = 300  # places by which the kernel is chosen
 WIDTHS, TRENDS, RIDGES = (0.5, 1.0), (0.3, 3.0), (0.1, 0.3, 1.0, 3.0, 10.0)
 FADE = 0.3  # [s]
 GOLDEN = 0.618  # steps of this size, round a circle, fill it evenly
@@ -29,7 +30,7 @@ def learn_reflex(
     The kernel and its ridge are those that foretell demonstrations best from the others.
     """
     usual = np.nanmean(np.concatenate(features), axis=0)
-    per_demonstration = max(PLACES // (len(times) * len(SPEEDS)), 1)
+    per_demonstration = int(np.clip(PLACES // (len(times) * len(SPEEDS)), 1, MOMENTS))
     parts = [
         _moments(t, f, observed, usual, per_demonstration, i)
         for i, (t, f) in enumerate(zip(times, features, strict=True))
