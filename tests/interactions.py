@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 from jaxtyping import config
 
 import inphase
@@ -16,6 +17,7 @@ from inphase.channels import make_channels
 from inphase.noise import Noise
 from inphase.phase import PhaseModel
 from inphase.preprocess.coordinates import Coordinates
+from inphase.training import reflex as learning
 from inphase.weight_prior import WeightPrior
 
 OBSERVED, CONTROLLED = ("reach", "lift"), ("grip", "turn")  # no two of one group: each is scaled for itself
@@ -34,8 +36,13 @@ def shapes_unchecked() -> Iterator[None]:
 
 
 def taught(demos: inphase.Dataset, **options: Any) -> inphase.Model:
-    """A model of all that is learned without playing held-out demonstrations, whose responses are the filter's own."""
-    model = inphase.fit(demos, calibrate=False, **options)
+    """A model of all that is learned without playing held-out demonstrations, whose responses are the filter's own.
+
+    Its reflex is one of few moments: it has no weight, and to learn it well takes longer than all the rest.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(learning, "MOMENTS", 2)
+        model = inphase.fit(demos, calibrate=False, **options)
     assert model.reflex is not None
     return replace(model, reflex=replace(model.reflex, weight=0.0))
 

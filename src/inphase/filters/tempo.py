@@ -13,6 +13,8 @@ from inphase.tempo import Tempo
 LONGEST_STEP = 0.02  # of a typical interaction: a long gap is crossed in several
 MOST_STEPS = 200  # after four whole interactions out of sight nothing is known any more
 REACH = 2.5  # standard deviations of other tempos that particles start with
+GOLDEN = 0.6180339887498949
+WAITING = 0.1  # of the particles, at the start: some partners have not begun
 PHASE_JITTER = 0.005  # after a typical interaction, so that particles that were copied part
 
 
@@ -53,16 +55,19 @@ def begin(
     from scipy.special import ndtri
 
     usual = round(count * (tempo.usual if tempo.usual in (0.0, 1.0) else 0.5))
-    spread = REACH * (2 * _shares(count - usual, rng) - 1)
+    even = (np.arange(count - usual) + rng.random(count - usual)) / max(count - usual, 1)
+    spread = REACH * (2 * even - 1)
+    # Starts in steps of the golden ratio lie evenly among the tempos, too, however these are weighted.
+    starts = np.concatenate([_shares(usual, rng), (GOLDEN * np.arange(count - usual) + rng.random()) % 1.0])
     own = np.concatenate([tempo.usual_std * ndtri(_shares(usual, rng)), tempo.other_std * spread])
     likely = np.concatenate([np.ones(usual), np.exp(-0.5 * spread**2)])
     share = np.repeat([tempo.usual, 1 - tempo.usual], [usual, count - usual])
     total = np.repeat([likely[:usual].sum(), likely[usual:].sum()], [usual, count - usual])
     motion = Motion(
-        phase.confine(phase.starts(_shares(count, rng))),
+        phase.confine(phase.starts(starts)),
         own,
         _mixed(count, tempo.steady, tempo.momentary_std, tempo.other_std, rng),
-        np.zeros(count, dtype=bool),
+        rng.permutation(count) < WAITING * count,
     )
     return motion, np.log(share * likely / total)
 

@@ -16,7 +16,6 @@ MOMENTS = 25  # at most, of a demonstration at each speed: more of them say the 
 CHOOSING = 300  # places by which the kernel is chosen
 WIDTHS, TRENDS, RIDGES = (0.5, 1.0), (0.3, 3.0), (0.1, 0.3, 1.0, 3.0, 10.0)
 FADE = 0.3  # [s]
-GOLDEN = 0.618  # steps of this size, round a circle, fill it evenly
 
 
 def learn_reflex(
@@ -31,10 +30,7 @@ def learn_reflex(
     """
     usual = np.nanmean(np.concatenate(features), axis=0)
     per_demonstration = int(np.clip(PLACES // (len(times) * len(SPEEDS)), 1, MOMENTS))
-    parts = [
-        _moments(t, f, observed, usual, per_demonstration, i)
-        for i, (t, f) in enumerate(zip(times, features, strict=True))
-    ]
+    parts = [_moments(t, f, observed, usual, per_demonstration) for t, f in zip(times, features, strict=True)]
     of = np.repeat(np.arange(len(parts)), [len(moments) for moments, _ in parts])
     kept = np.unique(np.linspace(0, len(of) - 1, min(PLACES, len(of))).round().astype(np.int64))
     moments, answers = (np.concatenate(part)[kept] for part in zip(*parts, strict=True))
@@ -67,7 +63,6 @@ def _moments(
     observed: int,
     usual: Float[np.ndarray, " F"],
     count: int,
-    number: int,
 ) -> tuple[Float[np.ndarray, "n L Fo"], Float[np.ndarray, "n Fc"]]:
     """The observed features at each lag, and the controlled ones: `count` at each speed, at other times in each."""
     curves = []
@@ -76,7 +71,7 @@ def _moments(
         curves.append((times[seen], feature[seen]) if seen.any() else (times[:1], np.full(1, mean)))
     moments, answers = [], []
     for k, speed in enumerate(SPEEDS):
-        share = (np.arange(count) + (0.5 + GOLDEN * number + k / len(SPEEDS)) % 1.0) / count
+        share = (np.arange(count) + (k + 0.5) / len(SPEEDS)) / count
         now = times[0] + share * (times[-1] - times[0])
         at = [[np.interp(now - lag * speed, *curve) for curve in curves[:observed]] for lag in LAGS]
         moments.append(np.moveaxis(np.array(at), 2, 0))
@@ -88,7 +83,8 @@ def _chosen(
     places: Float[np.ndarray, "n P"], off: Float[np.ndarray, "n Fc"], of: Int[np.ndarray, " n"]
 ) -> tuple[float, float, float]:
     """Width, trend and ridge by which demonstrations are foretold best from the others; every feature counts alike."""
-    some = np.unique(np.linspace(0, len(of) - 1, min(CHOOSING, len(of))).round().astype(np.int64))
+    of_each = np.bincount(of).max()
+    some = np.flatnonzero(np.arange(len(of)) % of_each % -(-len(of) // CHOOSING) == 0)  # the same of each demonstration
     places, of = places[some], of[some]
     off = off[some] / np.maximum(off.std(0), 1e-9)
 
