@@ -14,7 +14,7 @@ LONGEST_STEP = 0.02  # of a typical interaction: a long gap is crossed in severa
 MOST_STEPS = 200  # after four whole interactions out of sight nothing is known any more
 REACH = 2.5  # standard deviations of other tempos that particles start with
 GOLDEN = 0.6180339887498949
-WAITING = 0.1  # of the particles, at the start: some partners have not begun
+WAITING = 0.1  # of the particles, at the start, if there are pauses at all: some partners have not begun
 PHASE_JITTER = 0.005  # after a typical interaction, so that particles that were copied part
 
 
@@ -67,7 +67,7 @@ def begin(
         phase.confine(phase.starts(starts)),
         own,
         _mixed(count, tempo.steady, tempo.momentary_std, tempo.other_std, rng),
-        rng.permutation(count) < WAITING * count,
+        (rng.permutation(count) < WAITING * count) & (tempo.stop_rate > 0),
     )
     return motion, np.log(share * likely / total)
 
