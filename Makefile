@@ -30,7 +30,7 @@ lint: $(VENV)/dev  ## style, types and arrows
 bench: $(VENV)/demo  ## how long a step takes
 	$(BIN)/python benchmarks/step_time.py $(ARGS)
 
-accuracy: $(VENV)/demo  ## how accurate the filters are on the recordings beside this folder: 20 minutes or more
+accuracy: $(VENV)/demo  ## how accurate the filters are on the recordings beside this folder: an hour or more
 	$(BIN)/python benchmarks/accuracy.py $(ARGS)
 
 clean:  ## remove the environment and what the tools leave behind

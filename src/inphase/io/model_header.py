@@ -21,9 +21,9 @@ from inphase.reflex import Reflex
 from inphase.tempo import Tempo
 from inphase.weight_prior import WeightPrior
 
-# What older formats did not have, as they meant it.
 REFLEX_ARRAYS = ("lags", "centre", "scale", "places", "gains", "mean", "error_var")
 REFLEX_NUMBERS = ("width", "trend", "weight", "fade")
+# What older formats did not have, as they meant it.
 SINCE: dict[int, dict[str, Any]] = {2: {"tempo": {}, "reflex": None, "band": 1.0, "evidence": None}}
 SINCE_WITHIN: dict[int, dict[str, dict[str, Any]]] = {2: {"prior": {"blocks": []}}}  # in entries that they had
 
