@@ -16,7 +16,8 @@ class Tempo:
     usual, usual_std: the share of interactions at the demonstrations' tempo, and the spread of the logarithm of theirs.
     other_std: that of all the others. change_rate: of new tempos, steady: the share of stretches that keep to the
     tempo, momentary_std: their spread, stretch_rate: of new stretches. stop_rate, go_rate: of pauses and their ends.
-    Rates are per typical interaction; where there are pauses, a tenth has not begun at first. Raises OptionError for shares outside 0 … 1, or negative numbers.
+    Rates are per typical interaction; where there are pauses, a tenth has not begun at first. Raises OptionError for
+    shares outside 0 … 1, or negative numbers.
     """
 
     usual: float = 0.8

@@ -64,7 +64,7 @@ def _moments(
     usual: Float[np.ndarray, " F"],
     count: int,
 ) -> tuple[Float[np.ndarray, "n L Fo"], Float[np.ndarray, "n Fc"]]:
-    """The observed features at each lag, and the controlled ones: `count` at each speed, between those of the others."""
+    """The observed features at each lag, and the controlled ones: `count` at each speed, none at one time."""
     curves = []
     for feature, mean in zip(features.T, usual, strict=True):
         seen = np.isfinite(feature)
