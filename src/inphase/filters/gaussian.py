@@ -25,6 +25,21 @@ class InnovationScore:
         return np.asarray(cho_solve((self.root, True), columns, check_finite=False))
 
 
+def forward(roots: Float[np.ndarray, "P M M"], columns: Float[np.ndarray, "P M K"]) -> Float[np.ndarray, "P M K"]:
+    """(P, M, K) root⁻¹ @ columns for many lower triangular roots at once.
+
+    Row after row for all of them: numpy solves a stack by a general factorisation of each, in twice the time.
+    """
+    solved = np.empty_like(columns)
+    scale = 1 / np.diagonal(roots, axis1=1, axis2=2)
+    for i in range(columns.shape[1]):
+        rest = columns[:, i]
+        if i:
+            rest = rest - (roots[:, i : i + 1, :i] @ solved[:, :i])[:, 0]
+        np.multiply(rest, scale[:, i : i + 1], out=solved[:, i])
+    return solved
+
+
 def innovation_score(innovation: Float[np.ndarray, " M"], cov: Float[np.ndarray, "M M"]) -> InnovationScore | None:
     """The Gaussian log-density of an innovation under its covariance S (Eq. 2.7).
 

@@ -17,7 +17,7 @@ from inphase.arrays import freeze, frozen
 from inphase.errors import OptionError
 from inphase.filters.belief import Course
 from inphase.filters.filter import StepInfo
-from inphase.filters.gaussian import ABSURD
+from inphase.filters.gaussian import ABSURD, forward
 from inphase.filters.resampling import effective_size, systematic
 from inphase.filters.tempo import Motion, advance, begin
 from inphase.model import Model
@@ -27,6 +27,7 @@ VARIANCE_KEPT = 0.999  # by the directions that are filtered; the rest is added 
 MOST_DIRECTIONS = 24  # for the time a step takes
 RESAMPLE_BELOW = 0.5  # of the particles, their effective number
 PHASES = 100  # at which the rest of the variance is tabulated
+AT_ONCE = 8  # readings that are taken in together
 LOOKED_AT = 2000  # phases in a response, particles times samples; fewer particles speak for all when there are more
 
 
@@ -175,32 +176,57 @@ class Rbpf:
         # The variance that is not filtered lasts as long as the noise does, and is repeated as often.
         repeats = observation.noise_var / self.model.noise.var[features]
         noise_var = observation.noise_var + belief.directions.rest_at(phases, features) * repeats
-        innovation = observation.values - plain - np.einsum("prm,pr->pm", rows, belief.means)
-        cross = belief.covs @ rows  # Σ Hᵀ
-        innovation_cov = rows.transpose(0, 2, 1) @ cross  # S, Eq. 2.7
-        diagonal = np.arange(len(features))
-        innovation_cov[:, diagonal, diagonal] += noise_var
-        try:
-            root = np.linalg.cholesky(innovation_cov)
-        except np.linalg.LinAlgError:
+        with np.errstate(over="ignore", invalid="ignore"):  # an absurd reading is found out at the end
+            conditioned = _conditioned(belief, rows, observation.values - plain, noise_var)
+        if conditioned is None:
             return belief, StepInfo(healthy=False)
-        both = np.concatenate([innovation[:, :, None], cross.transpose(0, 2, 1)], axis=2)
-        white = np.linalg.solve(root, both)
-        with np.errstate(over="ignore", invalid="ignore"):  # an absurd reading is caught below
-            surprise = (white[:, :, 0] ** 2).sum(1)
-        log_det = 2 * np.log(root[:, diagonal, diagonal]).sum(1)
-        log_likelihood = -0.5 * (surprise + log_det + len(features) * np.log(2 * np.pi))
-        if not np.isfinite(log_likelihood).all() or surprise.min() > ABSURD**2 * len(features):
-            return belief, StepInfo(healthy=False)
-        gain = white[:, :, 1:]
-        means = belief.means + np.einsum("pmr,pm->pr", gain, white[:, :, 0])  # Eq. 2.9
-        covs = belief.covs - gain.transpose(0, 2, 1) @ gain  # Eq. 2.10, symmetric by construction
+        means, covs, log_likelihood, surprise = conditioned
         log_weights = np.log(np.maximum(belief.weights, 1e-300)) + log_likelihood
         highest = log_weights.max()
         updated = ParticleBelief(self.model, belief.directions, log_weights - highest, belief.motion, means, covs)
         # Particles that were somewhere else are surprised without need: it counts for as much as they still do.
         info = StepInfo(float(highest + np.log(np.exp(log_weights - highest).sum())), float(updated.weights @ surprise))
         return _resampled(updated, rng), info
+
+
+def _conditioned(
+    belief: ParticleBelief,
+    rows: Float[np.ndarray, "P R M"],
+    readings: Float[np.ndarray, "P M"],
+    noise_var: Float[np.ndarray, "P M"],
+) -> (
+    tuple[Float[np.ndarray, "P R"], Float[np.ndarray, "P R R"], Float[np.ndarray, " P"], Float[np.ndarray, " P"]] | None
+):
+    """Means, covariances, log-likelihood and squared surprise of every particle after a sample; None for an absurd one.
+
+    readings: less those of the mean movement. A few at a time, one lot after the other: their noise is independent,
+    and several small systems are less work than a large one.
+    """
+    means, covs = belief.means, belief.covs
+    count, readable = len(means), readings.shape[1]
+    log_likelihood, surprise = np.full(count, -0.5 * readable * np.log(2 * np.pi)), np.zeros(count)
+    for first in range(0, readable, AT_ONCE):
+        lot = slice(first, first + AT_ONCE)
+        across = rows[:, :, lot].transpose(0, 2, 1)  # H
+        innovation = readings[:, lot] - (across @ means[:, :, None])[:, :, 0]
+        cross = across @ covs  # H Σ
+        innovation_cov = cross @ rows[:, :, lot]  # S, Eq. 2.7
+        diagonal = np.arange(innovation.shape[1])
+        innovation_cov[:, diagonal, diagonal] += noise_var[:, lot]
+        try:
+            root = np.linalg.cholesky(innovation_cov)
+        except np.linalg.LinAlgError:
+            return None
+        white = forward(root, np.concatenate([innovation[:, :, None], cross], axis=2))
+        gain = white[:, :, 1:].transpose(0, 2, 1)
+        means = means + (gain @ white[:, :, :1])[:, :, 0]  # Eq. 2.9
+        covs = covs - gain @ white[:, :, 1:]  # Eq. 2.10, symmetric by construction
+        surprise += (white[:, :, 0] ** 2).sum(1)
+        log_likelihood -= np.log(root[:, diagonal, diagonal]).sum(1)
+    log_likelihood -= 0.5 * surprise
+    if not np.isfinite(log_likelihood).all() or surprise.min() > ABSURD**2 * readable:
+        return None
+    return means, covs, log_likelihood, surprise
 
 
 def _resampled(belief: ParticleBelief, rng: np.random.Generator) -> ParticleBelief:
