@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -77,7 +78,7 @@ class Model:
         if not 0 < self.band < np.inf:
             raise OptionError(f"expected a finite band > 0, got {self.band}")
         if self.reflex is not None:
-            shown = sum(self.channels[of[0]].role is Role.OBSERVED for of in self.coordinates.channel_of)
+            shown = self.observed_features
             parts, fitting = (self.reflex.observed, len(self.reflex.mean)), (shown, features - shown)
             if parts != fitting:
                 raise OptionError(f"reflex: expected {fitting} observed and controlled features, got {parts}")
@@ -93,17 +94,22 @@ class Model:
             f"{len(self.prior.samples)} demonstrations of {1 / self.phase.nominal_velocity:.2f} s)"
         )
 
-    @property
+    @cached_property
+    def observed_features(self) -> int:
+        """How many features the observed channels have; they come first."""
+        return len(self.coordinates.features_of(range(len(self.observed))))
+
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """The names of all channels: the observed ones, then the controlled."""
         return tuple(channel.name for channel in self.channels)
 
-    @property
+    @cached_property
     def observed(self) -> tuple[str, ...]:
         """The names of the observed channels."""
         return tuple(channel.name for channel in self.channels if channel.role is Role.OBSERVED)
 
-    @property
+    @cached_property
     def controlled(self) -> tuple[str, ...]:
         """The names of the controlled channels."""
         return tuple(channel.name for channel in self.channels if channel.role is Role.CONTROLLED)

@@ -120,6 +120,6 @@ class PhaseModel:
         whole cycles apart are at the same place.
         """
         if not self.periodic:
-            return np.asarray(np.clip(phases, 0.0, 1.0))
+            return np.asarray(np.minimum(np.maximum(phases, 0.0), 1.0))
         centre = np.angle(np.exp(2j * np.pi * phases).mean()) / (2 * np.pi) % 1.0
         return np.asarray(phases - np.round(phases - centre))

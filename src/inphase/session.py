@@ -42,7 +42,7 @@ class Session:
         self._seed = seed
         self._index = {name: i for i, name in enumerate(model.names)}
         self._typical_duration = 1.0 / model.phase.nominal_velocity
-        self._shown = model.coordinates.features_of(range(len(model.observed)))
+        self._shown = np.arange(model.observed_features)
         self.reset()
 
     def __repr__(self) -> str:

@@ -62,6 +62,19 @@ class Layout:
         ends = accumulate((basis.size for basis in self.bases), initial=0)
         return tuple(slice(start, end) for start, end in pairwise(ends))
 
+    def leading(self, count: int) -> Layout:
+        """The layout of the first `count` features alone; their weights are the first, too."""
+        if count == self.count:
+            return self
+        part = self._leading.get(count)
+        if part is None:
+            part = self._leading[count] = Layout(self.bases[:count])
+        return part
+
+    @cached_property
+    def _leading(self) -> dict[int, Layout]:
+        return {}
+
     def predict(
         self,
         phases: Float[np.ndarray, " P"],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -73,7 +74,7 @@ class GaussianBelief:
     def phase_cov(self) -> Float[np.ndarray, "K K"]:
         return self.cov[: self._size, : self._size]
 
-    @property
+    @cached_property
     def weights_mean(self) -> Float[np.ndarray, " B"]:
         prior = self.model.prior
         return frozen(prior.mean + self.mean[self._size :] @ prior.factor)
@@ -99,34 +100,71 @@ class GaussianBelief:
 
 @dataclass(frozen=True, eq=False)
 class EnsembleBelief:
-    """Members that are all equally likely (3.1). members: (E, K + B), a state [φ, φ̇, …, w] a row."""
+    """Members that are all equally likely (3.1): a state [φ, φ̇, …, w] a row.
+
+    carried: (E, K + B), or, with `roots` (Q, Bc), (E, K + B - Bc + Q): the last Bc weights are then mixtures of the
+    roots, and the last Q columns say which. What a Kalman update does to members is to mix them, so the controlled
+    weights need not be touched before a response is asked for.
+    """
 
     model: Model
-    members: Float[np.ndarray, "E n"]
+    carried: Float[np.ndarray, "E n"]
+    roots: Float[np.ndarray, "Q Bc"] | None = None
 
     def __post_init__(self) -> None:
-        freeze(self, members=self.members)
+        self.carried.setflags(write=False)
+
+    @cached_property
+    def members(self) -> Float[np.ndarray, "E n"]:
+        """(E, K + B) the states."""
+        return self._whole(self.carried)
+
+    @cached_property
+    def phase_mean(self) -> Float[np.ndarray, " K"]:
+        return frozen(self.carried[:, : self._size].mean(0))
+
+    @cached_property
+    def phase_cov(self) -> Float[np.ndarray, "K K"]:
+        off = self.carried[:, : self._size] - self.phase_mean
+        return frozen(off.T @ off / (len(off) - 1))
+
+    @cached_property
+    def weights_mean(self) -> Float[np.ndarray, " B"]:
+        return frozen(self._whole(self.carried.mean(0))[self._size :])
+
+    def readings(
+        self, phases: Float[np.ndarray, "E S"], features: Int[np.ndarray, " M"]
+    ) -> Float[np.ndarray, "E S M"]:
+        """What every member reads at phases of its own."""
+        shown, layout = self.model.observed_features, self.model.layout
+        if self.roots is not None and len(features) and features[-1] < shown:
+            partner = layout.leading(shown)
+            return partner.predict_each(phases, self.carried[:, self._size : self._size + partner.size], features)
+        return layout.predict_each(phases, self.members[:, self._size :], features)
+
+    def trajectory(
+        self, course: Course, features: Int[np.ndarray, " M"]
+    ) -> tuple[Float[np.ndarray, "S M"], Float[np.ndarray, "S M"]]:
+        phases = self.model.phase.confine(self.carried[:, :1] * course.share + course.offset)
+        each = self.readings(phases, features)
+        mean = each.sum(0) / len(each)
+        return mean, np.asarray(((each - mean) ** 2).sum(0) / (len(each) - 1))
 
     @property
     def _size(self) -> int:
         return len(self.model.phase.mean)
 
-    @property
-    def phase_mean(self) -> Float[np.ndarray, " K"]:
-        return frozen(self.members[:, : self._size].mean(0))
+    def _whole(self, carried: Float[np.ndarray, "*E _"]) -> Float[np.ndarray, "*E n"]:
+        if self.roots is None:
+            return carried
+        mixed = len(self.roots)
+        return frozen(np.concatenate([carried[..., :-mixed], carried[..., -mixed:] @ self.roots], axis=-1))
 
-    @property
-    def phase_cov(self) -> Float[np.ndarray, "K K"]:
-        size = self._size
-        return frozen(np.cov(self.members[:, :size], rowvar=False).reshape(size, size))
 
-    @property
-    def weights_mean(self) -> Float[np.ndarray, " B"]:
-        return frozen(self.members[:, self._size :].mean(0))
-
-    def trajectory(
-        self, course: Course, features: Int[np.ndarray, " M"]
-    ) -> tuple[Float[np.ndarray, "S M"], Float[np.ndarray, "S M"]]:
-        phases = self.model.phase.confine(self.members[:, :1] * course.share + course.offset)
-        each = self.model.layout.predict_each(phases, self.members[:, self._size :], features)
-        return np.asarray(each.mean(0)), np.asarray(each.var(0, ddof=1))
+def ensemble(model: Model, members: Float[np.ndarray, "E n"]) -> EnsembleBelief:
+    """Members [φ, φ̇, …, w], carried in as few columns as they need."""
+    kept = len(model.phase.mean) + model.layout.leading(model.observed_features).size
+    if members.shape[1] - kept <= len(members):
+        return EnsembleBelief(model, members)
+    mixed = np.eye(len(members))
+    return EnsembleBelief(model, np.concatenate([members[:, :kept], mixed], axis=1), members[:, kept:])

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
 
 from inphase.errors import OptionError, listing
-from inphase.filters.belief import EnsembleBelief
+from inphase.filters.belief import EnsembleBelief, ensemble
 from inphase.filters.filter import StepInfo
 from inphase.filters.gaussian import innovation_score
 from inphase.filters.motion import advance, begin
@@ -61,13 +61,13 @@ class Ebip:
             weights = prior.as_believed(self._mixture.draw(count, rng), rng)
         else:
             weights = prior.resample(count, rng)
-        return EnsembleBelief(self.model, np.concatenate([moving, weights], axis=1))
+        return ensemble(self.model, np.concatenate([moving, weights], axis=1))
 
     def predict(self, belief: EnsembleBelief, dt: float, rng: np.random.Generator) -> EnsembleBelief:
         """Eq. 3.1; only the phase and its derivatives move."""
         if dt == 0:
             return belief
-        return EnsembleBelief(self.model, advance(belief.members, self.model.phase, dt, rng))
+        return replace(belief, carried=advance(belief.carried, self.model.phase, dt, rng))
 
     def step(
         self, belief: EnsembleBelief, observation: Observation, dt: float, rng: np.random.Generator
@@ -75,27 +75,29 @@ class Ebip:
         """Eq. 3.1 to 3.7, over the rows that were seen."""
         if len(observation) == 0:
             return self.predict(belief, dt, rng), StepInfo()
-        layout, size = self.model.layout, len(self.model.phase.mean)
-        members = advance(belief.members, self.model.phase, dt, rng)
-        count = len(members)
-        readings = layout.predict_each(members[:, :1], members[:, size:], observation.features)[:, 0]  # HX, Eq. 3.2
-        mean = readings.mean(0)
+        belief = self.predict(belief, dt, rng)
+        members, values = belief.carried, observation.values
+        count, stds = len(members), np.sqrt(observation.noise_var)
+        readings = belief.readings(members[:, :1], observation.features)[:, 0]  # HX, Eq. 3.2
+        mean = readings.sum(0) / count
         deviations = readings - mean  # HA, Eq. 3.3
-        innovation_cov = deviations.T @ deviations / (count - 1) + np.diag(observation.noise_var)  # S, Eq. 3.4
-        score = innovation_score(observation.values - mean, innovation_cov)
+        innovation_cov = deviations.T @ deviations / (count - 1)
+        innovation_cov.flat[:: len(values) + 1] += observation.noise_var  # S, Eq. 3.4
+        score = innovation_score(values - mean, innovation_cov)
         if score is None:
-            return EnsembleBelief(self.model, members), StepInfo(healthy=False)
-        centre, stds = members.mean(0), np.sqrt(observation.noise_var)
-        gain = score.solve(deviations.T @ (members - centre) / (count - 1))  # Kᵀ, Eq. 3.5 and 3.6
+            return belief, StepInfo(healthy=False)
+        centre = members.sum(0) / count
+        around = members - centre  # A, Eq. 3.3
+        shared = deviations.T @ around / (count - 1)  # (A HAᵀ)ᵀ / (E - 1) of Eq. 3.5
         if self.update == "square-root":
-            around = _contracted(members - centre, deviations / stds / np.sqrt(count - 1))
-            members = centre + (observation.values - mean) @ gain + around
+            around = _contracted(around, deviations / stds / np.sqrt(count - 1))
+            members = centre + score.solve(values - mean) @ shared + around
         else:
-            # Eq. 3.7. The perturbation has standard deviation √R: R is a variance.
+            # Eq. 3.6, 3.7. The perturbation has standard deviation √R: R is a variance.
             noise = rng.standard_normal(readings.shape) * stds
-            members = members + (observation.values + noise - readings) @ gain
+            members = members + score.solve((values + noise - readings).T).T @ shared
         members[:, 0] = self.model.phase.confine(members[:, 0])
-        return EnsembleBelief(self.model, members), StepInfo(score.log_likelihood, score.surprise)
+        return replace(belief, carried=members), StepInfo(score.log_likelihood, score.surprise)
 
 
 def _contracted(around: Float[np.ndarray, "E n"], deviations: Float[np.ndarray, "E M"]) -> Float[np.ndarray, "E n"]:

@@ -18,11 +18,11 @@ class InnovationScore:
     log_likelihood: float
     surprise: float
 
-    def solve(self, columns: Float[np.ndarray, "M K"]) -> Float[np.ndarray, "M K"]:
+    def solve(self, columns: Float[np.ndarray, "M *K"]) -> Float[np.ndarray, "M *K"]:
         """S⁻¹ @ columns."""
-        from scipy.linalg import cho_solve
+        from scipy.linalg.lapack import dpotrs
 
-        return np.asarray(cho_solve((self.root, True), columns, check_finite=False))
+        return np.asarray(dpotrs(self.root, columns, lower=1)[0])
 
 
 def forward(roots: Float[np.ndarray, "P M M"], columns: Float[np.ndarray, "P M K"]) -> Float[np.ndarray, "P M K"]:
@@ -45,16 +45,16 @@ def innovation_score(innovation: Float[np.ndarray, " M"], cov: Float[np.ndarray,
 
     None where S is no covariance, or the innovation so many standard deviations off that it is no reading.
     """
-    try:
-        root = np.linalg.cholesky(cov)
-    except np.linalg.LinAlgError:
-        return None
-    from scipy.linalg import solve_triangular
+    # LAPACK itself: what numpy and scipy put around it takes longer than a small sample does.
+    from scipy.linalg.lapack import dpotrf, dtrtrs
 
-    white = solve_triangular(root, innovation, lower=True, check_finite=False)
+    root, refused = dpotrf(cov, lower=1)
+    if refused:
+        return None
+    white = dtrtrs(root, innovation, lower=1)[0]
     with np.errstate(over="ignore", invalid="ignore"):  # an absurd reading is caught below
         surprise = float(white @ white)
-    log_det = 2 * float(np.log(np.diag(root)).sum())
+    log_det = 2 * float(np.log(root.diagonal()).sum())
     if not (surprise <= ABSURD**2 * len(innovation) and np.isfinite(log_det)):
         return None
     return InnovationScore(root, -0.5 * (surprise + log_det + len(innovation) * np.log(2 * np.pi)), surprise)

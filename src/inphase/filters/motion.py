@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from math import sqrt
+
 import numpy as np
 from jaxtyping import Float
 
 from inphase.phase import PhaseModel
+
+TINY = np.finfo(float).tiny
 
 
 def begin(phase: PhaseModel, count: int, rng: np.random.Generator) -> Float[np.ndarray, "E K"]:
     """(E, K) `count` draws of [φ, φ̇, …] at the start of an interaction, which lies within it."""
     start = phase.starts(rng.random(count))
     # Only the phase is cut off: the others are drawn as Gaussians given it.
-    told = phase.cov[1:, 0] / max(phase.cov[0, 0], np.finfo(float).tiny)
+    told = phase.cov[1:, 0] / max(phase.cov[0, 0], TINY)
     untold_cov = phase.cov[1:, 1:] - np.outer(told, phase.cov[0, 1:])
     others = phase.mean[1:] + np.outer(start - phase.mean[0], told)
     others += rng.standard_normal(others.shape) @ root(untold_cov).T
@@ -38,6 +42,11 @@ def root(cov: Float[np.ndarray, "K K"]) -> Float[np.ndarray, "K K"]:
 
     Symmetric but for the scale: of all roots, the one that hardly moves when the covariance hardly does.
     """
-    scale = np.sqrt(np.maximum(np.diag(cov), np.finfo(float).tiny))
+    scale = np.sqrt(np.maximum(cov.diagonal(), TINY))
+    if len(cov) == 2:  # phase and tempo, as most have it: the root of [[1, c], [c, 1]] in closed form
+        together = min(max(float(cov[0, 1] / (scale[0] * scale[1])), -1.0), 1.0)
+        apart = 1 + sqrt(1 - together**2)
+        both = np.array([[apart, together], [together, apart]]) / sqrt(2 * apart)
+        return np.asarray(np.sqrt(np.maximum(cov.diagonal(), 0.0))[:, None] * both)
     value, vector = np.linalg.eigh(cov / np.outer(scale, scale))
     return np.asarray(scale[:, None] * ((vector * np.sqrt(np.maximum(value, 0.0))) @ vector.T))
