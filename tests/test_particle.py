@@ -329,7 +329,7 @@ def test_where_likely_phases_lie_on_both_sides_of_the_end_their_mean_is_there() 
     states = np.zeros((24, 2 + model.layout.size))
     states[:, 0], states[:, 1] = phases, 1.0
     weights = np.where(np.arange(24) < 4, 0.25 - 1e-12, 2e-13)
-    belief = WeightedBelief(model, states, np.log(weights))
+    belief = WeightedBelief(model, states[:, :2], states[:, 2:], np.arange(24), np.log(weights))
     assert belief.phase_mean[0] == pytest.approx(0.0025, abs=1e-9)
     assert np.sqrt(belief.phase_cov[0, 0]) == pytest.approx(np.std([-0.02, 0.0, 0.02, 0.01]), abs=1e-6)
 

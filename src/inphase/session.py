@@ -221,10 +221,13 @@ class Session:
             before = Course(np.ones(len(reflex.lags)), -tempo * (ago + reflex.lags))
             moments[:, ~seen] = self._belief.trajectory(before, self._shown[~seen])[0]
         answer, error_var = (part[own - len(self._shown)] for part in reflex.answer(moments))
-        then, then_var = (
-            part[0] for part in self._belief.trajectory(Course(np.ones(1), np.array([-tempo * ago])), own)
-        )
-        weighted = reflex.weight * seen.mean() * (then_var + noise.var[own])
+        if ago == 0 and (course.share[0], course.offset[0]) == (1.0, 0.0):  # the response begins where it was seen
+            then, then_var = mean[0, own], var[0, own]
+        else:
+            at_last = Course(np.ones(1), np.array([-tempo * ago]))
+            then, then_var = (part[0] for part in self._belief.trajectory(at_last, own))
+            then_var = then_var + noise.var[own]
+        weighted = reflex.weight * seen.mean() * then_var
         lasting = np.maximum(noise.correlation_time[own], np.finfo(float).tiny)
         lost = np.exp(-ago / reflex.fade - np.abs(ahead)[:, None] / lasting)
         share = lost * weighted / (weighted + error_var)

@@ -88,12 +88,20 @@ class Layout:
     def predict_each(
         self,
         phases: Float[np.ndarray, "E S"],
-        weights: Float[np.ndarray, "E B"],
+        weights: Float[np.ndarray, "N B"],
         features: Int[np.ndarray, " M"] | None = None,
+        which: Int[np.ndarray, " E"] | None = None,
     ) -> Float[np.ndarray, "E S M"]:
-        """(E, S, M) h(φ, w) for every member of an ensemble, each at its own phases."""
+        """(E, S, M) h(φ, w) for every member of an ensemble, each at its own phases.
+
+        which: the row of weights that each member has; None where every member has its own.
+        """
         plan = self._plan(features, weights)
-        parts = [block.basis(phases) @ block.weights(weights).swapaxes(-1, -2) for block in plan.blocks]
+        parts = []
+        for block in plan.blocks:
+            own = block.weights(weights)
+            own = own if which is None else own[which]
+            parts.append(block.basis(phases) @ own.swapaxes(-1, -2))
         return plan.join(parts, phases.shape)
 
     def slope(

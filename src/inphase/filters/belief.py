@@ -25,6 +25,15 @@ class Course:
     offset: Float[np.ndarray, " S"]
 
 
+def mixed(
+    weights: Float[np.ndarray, " P"], mean: Float[np.ndarray, "P S M"], var: Float[np.ndarray, "P S M"]
+) -> tuple[Float[np.ndarray, "S M"], Float[np.ndarray, "S M"]]:
+    """Mean and variance (S, M) of a mixture of as many distributions."""
+    shape, mean, var = mean.shape[1:], mean.reshape(len(weights), -1), var.reshape(len(weights), -1)
+    over_all = weights @ mean
+    return over_all.reshape(shape), (weights @ (var + (mean - over_all) ** 2)).reshape(shape)
+
+
 @runtime_checkable
 class Belief(Protocol):
     """A distribution over the state [φ, φ̇, …, w]."""

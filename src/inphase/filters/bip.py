@@ -57,18 +57,21 @@ class Bip:
         model, size, features = self.model, len(self.model.phase.mean), observation.features
         mean, cov = predicted.mean, predicted.cov
         phase, weights = mean[:1], predicted.weights_mean
-        jacobian = np.zeros((len(features), len(mean)))  # H of Eq. 2.6, in the prior's directions
+        jacobian = np.empty((len(features), len(mean)))  # H of Eq. 2.6, in the prior's directions
         jacobian[:, 0] = model.layout.slope(phase, weights, features)[0]
+        jacobian[:, 1:size] = 0.0
         jacobian[:, size:] = model.layout.project(float(phase[0]), model.prior.factor, features).T
         innovation = observation.values - model.layout.predict(phase, weights, features)[0]
         cross = cov @ jacobian.T
-        innovation_cov = jacobian @ cross + np.diag(observation.noise_var)  # S, Eq. 2.7
+        innovation_cov = jacobian @ cross  # S, Eq. 2.7
+        innovation_cov.flat[:: len(features) + 1] += observation.noise_var
         score = innovation_score(innovation, innovation_cov)
         if score is None:
             return predicted, StepInfo(healthy=False)
         gain = score.solve(cross.T).T  # K, Eq. 2.8
         mean = mean + gain @ innovation  # Eq. 2.9
         mean[:1] = model.phase.confine(mean[:1])
-        rest = np.eye(len(mean)) - gain @ jacobian
-        cov = rest @ cov @ rest.T + (gain * observation.noise_var) @ gain.T  # Eq. 2.10 in Joseph form
+        # Eq. 2.10 in Joseph form, (I - K H) Σ (I - K H)ᵀ + K R Kᵀ = Σ - K (H Σ) - (Σ Hᵀ - K S) Kᵀ, with no product of
+        # two matrices of the size of Σ.
+        cov = cov - np.concatenate([gain, cross - gain @ innovation_cov], axis=1) @ np.concatenate([cross, gain], axis=1).T
         return GaussianBelief(model, mean, (cov + cov.T) / 2), StepInfo(score.log_likelihood, score.surprise)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,17 +25,24 @@ PRIORS = ("demonstrations", "gaussian")
 class WeightedBelief:
     """Particles that are more or less likely.
 
-    particles: (P, K + B), a state [φ, φ̇, …, w] a row. log_weights: (P,), of
-    weights that sum to 1.
+    moving: (P, K) their phases and derivatives. drawn: (Q, B) the basis weights that were drawn at the start, and
+    origin: (P,) which of them each particle has: nothing moves them. log_weights: (P,), of weights that sum to 1.
     """
 
     model: Model
-    particles: Float[np.ndarray, "P n"]
+    moving: Float[np.ndarray, "P K"]
+    drawn: Float[np.ndarray, "Q B"]
+    origin: Int[np.ndarray, " P"]
     log_weights: Float[np.ndarray, " P"]
 
     def __post_init__(self) -> None:
-        for array in (self.particles, self.log_weights):
+        for array in (self.moving, self.origin, self.log_weights):
             array.setflags(write=False)
+
+    @property
+    def particles(self) -> Float[np.ndarray, "P n"]:
+        """(P, K + B) the states [φ, φ̇, …, w]."""
+        return frozen(np.concatenate([self.moving, self.drawn[self.origin]], axis=1))
 
     @cached_property
     def weights(self) -> Float[np.ndarray, " P"]:
@@ -43,42 +50,45 @@ class WeightedBelief:
         weights = np.exp(self.log_weights - self.log_weights.max())
         return frozen(weights / weights.sum())
 
-    @property
-    def _size(self) -> int:
-        return len(self.model.phase.mean)
-
     @cached_property
     def _moving(self) -> Float[np.ndarray, "P K"]:
         """Phase and derivatives; a circle of phases is cut opposite to where they are likely, not where they are."""
-        moving = self.particles[:, : self._size].copy()
+        moving = self.moving
         if self.model.phase.periodic:
-            phases = moving[:, 0]
+            moving, phases = moving.copy(), moving[:, 0]
             centre = np.angle(self.weights @ np.exp(2j * np.pi * phases)) / (2 * np.pi)
             moving[:, 0] = phases - np.round(phases - centre)
         return moving
 
-    @property
+    @cached_property
     def phase_mean(self) -> Float[np.ndarray, " K"]:
         mean = self.weights @ self._moving
         mean[:1] = self.model.phase.confine(mean[:1])
         return frozen(mean)
 
-    @property
+    @cached_property
     def phase_cov(self) -> Float[np.ndarray, "K K"]:
         off = self._moving - self.weights @ self._moving
         return frozen((off * self.weights[:, None]).T @ off)
 
-    @property
+    @cached_property
     def weights_mean(self) -> Float[np.ndarray, " B"]:
-        return frozen(self.weights @ self.particles[:, self._size :])
+        return frozen(np.bincount(self.origin, self.weights, minlength=len(self.drawn)) @ self.drawn)
+
+    def readings(
+        self, phases: Float[np.ndarray, "P S"], features: Int[np.ndarray, " M"]
+    ) -> Float[np.ndarray, "P S M"]:
+        """What every particle reads at phases of its own."""
+        return self.model.layout.predict_each(phases, self.drawn, features, self.origin)
 
     def trajectory(
         self, course: Course, features: Int[np.ndarray, " M"]
     ) -> tuple[Float[np.ndarray, "S M"], Float[np.ndarray, "S M"]]:
-        phases = self.model.phase.confine(self.particles[:, :1] * course.share + course.offset)
-        each = self.model.layout.predict_each(phases, self.particles[:, self._size :], features)
-        mean = np.tensordot(self.weights, each, 1)
-        return mean, np.tensordot(self.weights, (each - mean) ** 2, 1)
+        phases = self.model.phase.confine(self.moving[:, :1] * course.share + course.offset)
+        each = self.readings(phases, features).reshape(len(phases), -1)
+        mean = self.weights @ each
+        var = self.weights @ (each - mean) ** 2
+        return mean.reshape(-1, len(features)), var.reshape(-1, len(features))
 
 
 @dataclass(frozen=True)
@@ -116,13 +126,14 @@ class Particle:
         prior, count = self.model.prior, int(self.particles)
         moving = begin(self.model.phase, count, rng)
         weights = prior.draw(count, rng) if self.prior == "gaussian" else prior.resample(count, rng)
-        return WeightedBelief(self.model, np.concatenate([moving, weights], axis=1), even(count))
+        drawn, origin = np.unique(weights, axis=0, return_inverse=True)
+        return WeightedBelief(self.model, moving, drawn, origin.reshape(-1), even(count))
 
     def predict(self, belief: WeightedBelief, dt: float, rng: np.random.Generator) -> WeightedBelief:
         """Eq. 3.1 for every particle; only the phase and its derivatives move."""
         if dt == 0:
             return belief
-        return WeightedBelief(self.model, advance(belief.particles, self.model.phase, dt, rng), belief.log_weights)
+        return replace(belief, moving=advance(belief.moving, self.model.phase, dt, rng))
 
     def step(
         self, belief: WeightedBelief, observation: Observation, dt: float, rng: np.random.Generator
@@ -131,21 +142,21 @@ class Particle:
         belief = self.predict(belief, dt, rng)
         if len(observation) == 0:
             return belief, StepInfo()
-        size, weights, noise_var = len(self.model.phase.mean), belief.weights, observation.noise_var
-        readings = self.model.layout.predict_each(
-            belief.particles[:, :1], belief.particles[:, size:], observation.features
-        )[:, 0]
+        weights, noise_var = belief.weights, observation.noise_var
+        readings = belief.readings(belief.moving[:, :1], observation.features)[:, 0]
         mean = weights @ readings
         off = readings - mean
-        score = innovation_score(observation.values - mean, (off * weights[:, None]).T @ off + np.diag(noise_var))
+        innovation_cov = (off * weights[:, None]).T @ off
+        innovation_cov.flat[:: len(noise_var) + 1] += noise_var
+        score = innovation_score(observation.values - mean, innovation_cov)
         with np.errstate(over="ignore"):  # an absurd reading is caught below
-            squared = ((observation.values - readings) ** 2 / noise_var).sum(1)
+            squared = (observation.values - readings) ** 2 @ (1 / noise_var)
         log_weights = belief.log_weights - 0.5 * (squared + np.log(2 * np.pi * noise_var).sum())
         highest = float(log_weights.max())
         if score is None or not np.isfinite(highest):
             return belief, StepInfo(healthy=False)
         log_likelihood = highest + float(np.log(np.exp(log_weights - highest).sum()))
-        weighed = WeightedBelief(self.model, belief.particles, log_weights - log_likelihood)
+        weighed = replace(belief, log_weights=log_weights - log_likelihood)
         return self._resampled(weighed, rng), StepInfo(log_likelihood, score.surprise)
 
     def _resampled(self, belief: WeightedBelief, rng: np.random.Generator) -> WeightedBelief:
@@ -154,7 +165,7 @@ class Particle:
         if effective_size(belief.weights) >= self.resample_below * count:
             return belief
         kept = systematic(belief.weights, count, float(rng.random()))
-        return WeightedBelief(self.model, belief.particles[kept], even(count))
+        return replace(belief, moving=belief.moving[kept], origin=belief.origin[kept], log_weights=even(count))
 
 
 def even(count: int) -> Float[np.ndarray, " P"]:

@@ -16,7 +16,7 @@ from jaxtyping import Float, Int
 from inphase.arrays import frozen
 from inphase.errors import OptionError, listing
 from inphase.filters.alignment import WINDOW, Alignment, grid
-from inphase.filters.belief import Course
+from inphase.filters.belief import Course, mixed
 from inphase.filters.candidates import Candidates
 from inphase.filters.conditioning import Foreseen, Weights, foresee
 from inphase.filters.filter import StepInfo
@@ -73,9 +73,7 @@ class PrompBelief:
         plain = layout.predict(flat, prior.mean, features).reshape(*phases.shape, -1)
         mean = plain + (self.weights.means[:, None, None] @ rows)[:, :, 0]
         var = np.maximum((rows * (self.weights.covs[:, None] @ rows)).sum(2), 0.0)
-        shares = self.timing.node_weights
-        over_all = np.tensordot(shares, mean, 1)
-        return over_all, np.tensordot(shares, var + (mean - over_all) ** 2, 1)
+        return mixed(self.timing.node_weights, mean, var)
 
 
 @dataclass(frozen=True)

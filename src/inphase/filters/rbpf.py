@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 
 from inphase.arrays import freeze, frozen
 from inphase.errors import OptionError
-from inphase.filters.belief import Course
+from inphase.filters.belief import Course, mixed
 from inphase.filters.filter import StepInfo
 from inphase.filters.gaussian import ABSURD, forward
 from inphase.filters.resampling import effective_size, systematic
@@ -78,16 +78,16 @@ class ParticleBelief:
     def _moving(self) -> Float[np.ndarray, "P K"]:
         return np.stack([self.motion.phase, self.motion.tempo(self.model.phase)], axis=1)
 
-    @property
+    @cached_property
     def phase_mean(self) -> Float[np.ndarray, " K"]:
         return frozen(self.weights @ self._moving)
 
-    @property
+    @cached_property
     def phase_cov(self) -> Float[np.ndarray, "K K"]:
         off = self._moving - self.phase_mean
         return frozen((off * self.weights[:, None]).T @ off)
 
-    @property
+    @cached_property
     def weights_mean(self) -> Float[np.ndarray, " B"]:
         return frozen(self.model.prior.mean + self.weights @ self.means @ self.directions.rows)
 
@@ -106,11 +106,10 @@ class ParticleBelief:
         layout = self.model.layout
         rows = layout.project_each(phases, self.directions.rows, features).reshape(*confined.shape, -1, len(features))
         plain = layout.predict(phases, self.model.prior.mean, features).reshape(*confined.shape, -1)
-        mean = plain + np.einsum("psrm,pr->psm", rows, self.means[speaking])
-        var = (rows * (self.covs[speaking][:, None] @ rows)).sum(2)
+        mean = plain + (self.means[speaking][:, None, None] @ rows)[:, :, 0]
+        var = np.einsum("psrm,psrm->psm", rows, self.covs[speaking][:, None] @ rows)
         var += self.directions.rest_at(phases, features).reshape(var.shape)
-        over_all = np.tensordot(weights, mean, 1)
-        return over_all, np.tensordot(weights, var + (mean - over_all) ** 2, 1)
+        return mixed(weights, mean, var)
 
 
 @dataclass(frozen=True)
