@@ -28,7 +28,7 @@ lint: $(VENV)/dev  ## style, types and arrows
 	$(BIN)/lint-imports
 
 bench: $(VENV)/demo  ## how long a step takes
-	$(BIN)/python benchmarks/step_time.py $(ARGS)
+	$(BIN)/python benchmarks/speed.py $(ARGS)
 
 accuracy: $(VENV)/demo  ## how accurate the filters are on the recordings beside this folder: an hour or more
 	$(BIN)/python benchmarks/accuracy.py $(ARGS)

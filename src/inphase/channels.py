@@ -117,13 +117,15 @@ def match(patterns: Iterable[str], names: Sequence[str]) -> list[int]:
     """
     patterns = [patterns] if isinstance(patterns, str) else list(patterns)
     found: set[int] = set()
+    places: dict[str, list[int]] = {}
+    for i, name in enumerate(names):
+        places.setdefault(name, []).append(i)
     for pattern in patterns:
         # A name is taken literally first: a channel may really be called "force[0]".
-        hits = {i for i, name in enumerate(names) if name == pattern}
-        hits = hits or {i for i, name in enumerate(names) if fnmatch.fnmatchcase(name, pattern)}
+        hits = places.get(pattern) or [i for i, name in enumerate(names) if fnmatch.fnmatchcase(name, pattern)]
         if not hits:
             raise ChannelError(f"no channel fits {pattern!r}; the channels are {listing(names)}")
-        found |= hits
+        found.update(hits)
     return sorted(found)
 
 

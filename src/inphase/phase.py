@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import factorial
+from functools import cache
+from math import factorial, sqrt
 
 import numpy as np
 from jaxtyping import Float
 
-from inphase.arrays import freeze
+from inphase.arrays import freeze, frozen
 from inphase.errors import OptionError
 
 ORDERS = (0, 1, 2)
@@ -87,10 +88,8 @@ class PhaseModel:
 
     def transition(self, dt: float) -> Float[np.ndarray, "K K"]:
         """The phase block of G in Eq. 2.4, dt [s] later: a Taylor step."""
-        size = len(self.mean)
-        return np.array(
-            [[dt ** (j - i) / factorial(j - i) if j >= i else 0.0 for j in range(size)] for i in range(size)]
-        )
+        powers, factorials = _taylor(len(self.mean))
+        return np.asarray(dt**powers / factorials)
 
     def process_cov(self, dt: float) -> Float[np.ndarray, "K K"]:
         """The phase block of Q in Eq. 2.5, dt [s] later.
@@ -100,18 +99,12 @@ class PhaseModel:
         two models Eq. 2.5 names, this one does not depend on how a stretch of time is cut into samples:
         Q(a + b) = F(b) Q(a) F(b)ᵀ + Q(b). (The matrix printed there mixes the entries of both.)
         """
-        n = self.order
-        return np.array(
-            [
-                [
-                    self.diffusion
-                    * dt ** (2 * n - i - j + 1)
-                    / (factorial(n - i) * factorial(n - j) * (2 * n - i - j + 1))
-                    for j in range(n + 1)
-                ]
-                for i in range(n + 1)
-            ]
-        )
+        scale = self.process_scale(dt)
+        return np.asarray(np.outer(scale, scale) * unit_process_cov(self.order))
+
+    def process_scale(self, dt: float) -> Float[np.ndarray, " K"]:
+        """(K,) what the rows and columns of `unit_process_cov` are multiplied by, dt [s] later."""
+        return np.asarray(sqrt(self.diffusion) * dt ** (np.arange(self.order, -1, -1) + 0.5))
 
     def confine(self, phases: Float[np.ndarray, "*E"]) -> Float[np.ndarray, "*E"]:
         """Phases brought back to where they make sense: into [0, 1], or when periodic within half a turn of their mean.
@@ -123,3 +116,18 @@ class PhaseModel:
             return np.asarray(np.minimum(np.maximum(phases, 0.0), 1.0))
         centre = np.angle(np.exp(2j * np.pi * phases).mean()) / (2 * np.pi) % 1.0
         return np.asarray(phases - np.round(phases - centre))
+
+
+@cache
+def unit_process_cov(order: int) -> Float[np.ndarray, "K K"]:
+    """(K, K) the noise of a process of that order, a second later, at a spectral density of 1."""
+    left = range(order, -1, -1)
+    return frozen([[1 / (factorial(i) * factorial(j) * (i + j + 1)) for j in left] for i in left])
+
+
+@cache
+def _taylor(size: int) -> tuple[Float[np.ndarray, "K K"], Float[np.ndarray, "K K"]]:
+    """(K, K) powers and factorials of a Taylor step; infinite factorials where nothing is carried over."""
+    ahead = np.arange(size) - np.arange(size)[:, None]
+    factorials = [[factorial(j) if j >= 0 else np.inf for j in row] for row in ahead.tolist()]
+    return frozen(np.maximum(ahead, 0)), frozen(factorials)

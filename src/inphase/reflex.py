@@ -8,11 +8,12 @@ filter's and a regression's on what was just seen, each counting by its precisio
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from inphase.arrays import freeze
+from inphase.arrays import freeze, frozen
 from inphase.errors import OptionError
 
 NEAR = 4  # power of the similarity by which places tell of the error: only those close by
@@ -82,12 +83,21 @@ class Reflex:
     def answer(self, moments: Float[np.ndarray, "L Fo"]) -> tuple[Float[np.ndarray, " Fc"], Float[np.ndarray, " Fc"]]:
         """(Fc,) the controlled features, and the variance of their error, for the observed ones at each lag."""
         here = place(moments, self.centre, self.scale)
-        alike = similarity(here, self.places, self.width)
-        mean = self.mean + (alike + self.trend * (self.places @ here)) @ self.gains
+        inner = self.places @ here
+        alike = kernel(here @ here + self._lengths - 2 * inner, self.width)
+        mean = self.mean + (alike + self.trend * inner) @ self.gains
         near = alike**NEAR
         # Where nobody was near, the error is that of everywhere.
-        var = (near @ self.error_var + DOUBT * self.error_var.mean(0)) / (near.sum() + DOUBT)
+        var = (near @ self.error_var + DOUBT * self._usual_error_var) / (near.sum() + DOUBT)
         return mean, var
+
+    @cached_property
+    def _lengths(self) -> Float[np.ndarray, " n"]:
+        return frozen((self.places**2).sum(1))
+
+    @cached_property
+    def _usual_error_var(self) -> Float[np.ndarray, " Fc"]:
+        return frozen(self.error_var.mean(0))
 
 
 def place(
@@ -99,11 +109,8 @@ def place(
     return np.asarray(scaled.reshape(*scaled.shape[:-2], -1) / np.sqrt(scaled.shape[-1] * scaled.shape[-2]))
 
 
-def similarity(
-    here: Float[np.ndarray, "*m P"], there: Float[np.ndarray, "n P"], width: float
-) -> Float[np.ndarray, "*m n"]:
-    """The rational quadratic kernel (of shape 1): 1 for the same place, and far away it still remembers."""
-    apart = (here**2).sum(-1)[..., None] + (there**2).sum(-1) - 2 * here @ there.T
+def kernel(apart: Float[np.ndarray, "*n"], width: float) -> Float[np.ndarray, "*n"]:
+    """The rational quadratic kernel (of shape 1) of squared distances: 1 at 0, and far away it still remembers."""
     return np.asarray(1 / (1 + np.maximum(apart, 0.0) / (2 * width**2)))
 
 

@@ -43,6 +43,7 @@ class Session:
         self._index = {name: i for i, name in enumerate(model.names)}
         self._typical_duration = 1.0 / model.phase.nominal_velocity
         self._shown = np.arange(model.observed_features)
+        self._answered = self._columns(model.controlled)
         self.reset()
 
     def __repr__(self) -> str:
@@ -114,8 +115,7 @@ class Session:
         """
         course = self._course(lookahead, start, samples)
         model = self.model
-        columns = match(model.controlled if channels is None else channels, model.names)
-        features = model.coordinates.features_of(columns)
+        columns, features = self._answered if channels is None else self._columns(channels)
         mean, var = np.zeros((samples, model.coordinates.count)), np.zeros((samples, model.coordinates.count))
         phase, velocity = self._belief.phase_mean[0], self._velocity()[0]
         phases = course.share * phase + course.offset
@@ -133,7 +133,7 @@ class Session:
             phases=phases % 1.0 if model.phase.periodic else phases,
             mean=mean[:, columns],
             std=np.sqrt(var[:, columns]),
-            channels=tuple(model.names[i] for i in columns),
+            channels=tuple([model.names[i] for i in columns]),
         )
 
     def _sample(self, values: ArrayLike | Mapping[str, float]) -> Float[np.ndarray, " D"]:
@@ -234,6 +234,10 @@ class Session:
         # The variance of a mixture of both: their errors have much in common, and where they disagree, who knows?
         var[:, own] += share * (error_var - var[:, own]) + share * (1 - share) * (answer - then) ** 2
         mean[:, own] += share * (answer - then)
+
+    def _columns(self, channels: Sequence[str] | str) -> tuple[list[int], Int[np.ndarray, " M"]]:
+        columns = match(channels, self.model.names)
+        return columns, self.model.coordinates.features_of(columns)
 
     def _course(self, lookahead: float, start: float | None, samples: int) -> Course:
         if not (isinstance(samples, (int, np.integer)) and samples >= 1):

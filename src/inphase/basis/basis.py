@@ -43,11 +43,15 @@ class Basis(Protocol):
         """The arguments that make an equal basis."""
 
 
-def clipped(phases: Float[np.ndarray, "*P"]) -> tuple[Float[np.ndarray, "*P 1"], Bool[np.ndarray, "*P 1"]]:
+def clipped(phases: Float[np.ndarray, "*P"]) -> Float[np.ndarray, "*P 1"]:
+    """(*P, 1) the phases brought into [0, 1]."""
+    return np.asarray(np.minimum(np.maximum(phases[..., None], 0.0), 1.0))
+
+
+def clipped_and_inside(phases: Float[np.ndarray, "*P"]) -> tuple[Float[np.ndarray, "*P 1"], Bool[np.ndarray, "*P 1"]]:
     """(*P, 1) the phases brought into [0, 1], and (*P, 1) whether they were there already."""
-    column = phases[..., None]
-    within = np.minimum(np.maximum(column, 0.0), 1.0)
-    return within, within == column
+    within = clipped(phases)
+    return within, within == phases[..., None]
 
 
 def spread(size: int) -> Float[np.ndarray, " B"]:

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from inphase.arrays import frozen
-from inphase.basis.basis import arguments, clipped, positive, settle, whole
+from inphase.basis.basis import arguments, clipped, clipped_and_inside, positive, settle, whole
 from inphase.errors import OptionError
 
 
@@ -45,13 +45,15 @@ class Gaussian:
         settle(self, size=size, width=width, margin=float(margin), _centres=centres, _scale=1 / width)
 
     def __call__(self, phases: Float[np.ndarray, "*P"]) -> Float[np.ndarray, "*P B"]:
-        distance = (clipped(phases)[0] - self._centres) * self._scale
-        return np.asarray(np.exp(-0.5 * distance * distance))
+        distance = (clipped(phases) - self._centres) * self._scale
+        distance *= distance
+        distance *= -0.5
+        return np.asarray(np.exp(distance, out=distance))
 
     def with_derivative(
         self, phases: Float[np.ndarray, "*P"]
     ) -> tuple[Float[np.ndarray, "*P B"], Float[np.ndarray, "*P B"]]:
-        within, inside = clipped(phases)
+        within, inside = clipped_and_inside(phases)
         distance = (within - self._centres) * self._scale
         values = np.exp(-0.5 * distance * distance)
         return values, values * distance * (inside * -self._scale)

@@ -139,6 +139,25 @@ class Layout:
         shape = (len(phases), len(rows))
         return plan.join([p.reshape(*shape, b.count) for p, b in zip(parts, plan.blocks, strict=True)], shape)
 
+    def variance(
+        self,
+        phases: Float[np.ndarray, " P"],
+        rows: Float[np.ndarray, "N B"],
+        cov: Float[np.ndarray, "N N"],
+        features: Int[np.ndarray, " M"] | None = None,
+    ) -> Float[np.ndarray, "P M"]:
+        """(P, M) the variance of the features at each phase, where w = mean + c @ rows and c has the covariance `cov`.
+
+        Of each feature's own weights first: there are fewer of them than phases.
+        """
+        plan, parts = self._plan(features, rows), []
+        for block in plan.blocks:
+            own = block.weights(rows).transpose(1, 2, 0)  # (m, size, N)
+            spread = (own.reshape(-1, len(rows)) @ cov).reshape(own.shape) @ own.swapaxes(1, 2)
+            values = block.basis(phases)
+            parts.append(((values @ spread) * values).sum(2).T)
+        return plan.join(parts, phases.shape)
+
     def lift(
         self, phase: float, columns: Float[np.ndarray, "M K"], features: Int[np.ndarray, " M"] | None = None
     ) -> Float[np.ndarray, "B K"]:

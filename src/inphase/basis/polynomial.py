@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from inphase.arrays import frozen
-from inphase.basis.basis import MOST, arguments, clipped, settle, whole
+from inphase.basis.basis import MOST, arguments, clipped, clipped_and_inside, settle, whole
 
 
 @dataclass(frozen=True)
@@ -37,12 +37,12 @@ class Polynomial:
         return self.degree + 1
 
     def __call__(self, phases: Float[np.ndarray, "*P"]) -> Float[np.ndarray, "*P B"]:
-        return bernstein(clipped(phases)[0], self._binomials)
+        return bernstein(clipped(phases), self._binomials)
 
     def with_derivative(
         self, phases: Float[np.ndarray, "*P"]
     ) -> tuple[Float[np.ndarray, "*P B"], Float[np.ndarray, "*P B"]]:
-        within, inside = clipped(phases)
+        within, inside = clipped_and_inside(phases)
         # d/dφ b(n, k) = n (b(n - 1, k - 1) - b(n - 1, k))
         lower = bernstein(within, self._lower_binomials) * (inside * float(self.degree))
         slopes = np.zeros((*phases.shape, self.size))

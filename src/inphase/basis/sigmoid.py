@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from inphase.arrays import frozen
-from inphase.basis.basis import arguments, clipped, positive, settle, spread, whole
+from inphase.basis.basis import arguments, clipped, clipped_and_inside, positive, settle, spread, whole
 
 LOGISTIC_STD = math.pi / math.sqrt(3)  # of the bump that is the slope of a logistic step of width 1
 
@@ -37,12 +37,12 @@ class Sigmoid:
         settle(self, size=size, width=width, _centres=frozen(spread(size)), _scale=1 / width)
 
     def __call__(self, phases: Float[np.ndarray, "*P"]) -> Float[np.ndarray, "*P B"]:
-        return self._steps(clipped(phases)[0])
+        return self._steps(clipped(phases))
 
     def with_derivative(
         self, phases: Float[np.ndarray, "*P"]
     ) -> tuple[Float[np.ndarray, "*P B"], Float[np.ndarray, "*P B"]]:
-        within, inside = clipped(phases)
+        within, inside = clipped_and_inside(phases)
         values = self._steps(within)
         return values, values * (1 - values) * (inside * self._scale)
 

@@ -9,7 +9,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float, Int
 
-from inphase.arrays import freeze, frozen
+from inphase.arrays import frozen
 from inphase.model import Model
 
 
@@ -69,7 +69,8 @@ class GaussianBelief:
     cov: Float[np.ndarray, "n n"]
 
     def __post_init__(self) -> None:
-        freeze(self, mean=self.mean, cov=self.cov)
+        for array in (self.mean, self.cov):
+            array.setflags(write=False)
 
     @property
     def _size(self) -> int:
@@ -121,7 +122,9 @@ class EnsembleBelief:
     roots: Float[np.ndarray, "Q Bc"] | None = None
 
     def __post_init__(self) -> None:
-        self.carried.setflags(write=False)
+        for array in (self.carried, self.roots):
+            if array is not None:
+                array.setflags(write=False)
 
     @cached_property
     def members(self) -> Float[np.ndarray, "E n"]:
@@ -141,9 +144,7 @@ class EnsembleBelief:
     def weights_mean(self) -> Float[np.ndarray, " B"]:
         return frozen(self._whole(self.carried.mean(0))[self._size :])
 
-    def readings(
-        self, phases: Float[np.ndarray, "E S"], features: Int[np.ndarray, " M"]
-    ) -> Float[np.ndarray, "E S M"]:
+    def readings(self, phases: Float[np.ndarray, "E S"], features: Int[np.ndarray, " M"]) -> Float[np.ndarray, "E S M"]:
         """What every member reads at phases of its own."""
         shown, layout = self.model.observed_features, self.model.layout
         if self.roots is not None and len(features) and features[-1] < shown:

@@ -42,10 +42,11 @@ class Bip:
         mean, cov = belief.mean.copy(), belief.cov.copy()
         mean[:size] = transition @ mean[:size]
         mean[:1] = phase.confine(mean[:1])
-        cov[:size] = transition @ cov[:size]
-        cov[:, :size] = cov[:, :size] @ transition.T
-        cov[:size, :size] += phase.process_cov(dt)
-        return GaussianBelief(self.model, mean, (cov + cov.T) / 2)
+        cov[:size, size:] = transition @ cov[:size, size:]
+        cov[size:, :size] = cov[:size, size:].T
+        moved = transition @ cov[:size, :size] @ transition.T + phase.process_cov(dt)
+        cov[:size, :size] = (moved + moved.T) / 2
+        return GaussianBelief(self.model, mean, cov)
 
     def step(
         self, belief: GaussianBelief, observation: Observation, dt: float, rng: np.random.Generator
@@ -71,7 +72,7 @@ class Bip:
         gain = score.solve(cross.T).T  # K, Eq. 2.8
         mean = mean + gain @ innovation  # Eq. 2.9
         mean[:1] = model.phase.confine(mean[:1])
-        # Eq. 2.10 in Joseph form, (I - K H) Σ (I - K H)ᵀ + K R Kᵀ = Σ - K (H Σ) - (Σ Hᵀ - K S) Kᵀ, with no product of
-        # two matrices of the size of Σ.
-        cov = cov - np.concatenate([gain, cross - gain @ innovation_cov], axis=1) @ np.concatenate([cross, gain], axis=1).T
-        return GaussianBelief(model, mean, (cov + cov.T) / 2), StepInfo(score.log_likelihood, score.surprise)
+        # Eq. 2.10 in Joseph form, (I - K H) Σ (I - K H)ᵀ + K R Kᵀ, multiplied out: no product of two matrices of the
+        # size of Σ is left, and what is symmetric stays so.
+        half = gain @ (cross - 0.5 * (gain @ innovation_cov)).T
+        return GaussianBelief(model, mean, cov - (half + half.T)), StepInfo(score.log_likelihood, score.surprise)

@@ -81,21 +81,23 @@ class Ebip:
         readings = belief.readings(members[:, :1], observation.features)[:, 0]  # HX, Eq. 3.2
         mean = readings.sum(0) / count
         deviations = readings - mean  # HA, Eq. 3.3
+        deviations -= deviations.sum(0) / count  # of their rounding, so that members need not be centred below
         innovation_cov = deviations.T @ deviations / (count - 1)
         innovation_cov.flat[:: len(values) + 1] += observation.noise_var  # S, Eq. 3.4
         score = innovation_score(values - mean, innovation_cov)
         if score is None:
             return belief, StepInfo(healthy=False)
-        centre = members.sum(0) / count
-        around = members - centre  # A, Eq. 3.3
-        shared = deviations.T @ around / (count - 1)  # (A HAᵀ)ᵀ / (E - 1) of Eq. 3.5
         if self.update == "square-root":
-            around = _contracted(around, deviations / stds / np.sqrt(count - 1))
-            members = centre + score.solve(values - mean) @ shared + around
+            centre = members.mean(0)
+            around = members - centre  # A, Eq. 3.3
+            moved = score.solve(values - mean) @ (deviations.T @ around / (count - 1))
+            members = centre + moved + _contracted(around, deviations / stds / np.sqrt(count - 1))
         else:
             # Eq. 3.6, 3.7. The perturbation has standard deviation √R: R is a variance.
             noise = rng.standard_normal(readings.shape) * stds
-            members = members + score.solve((values + noise - readings).T).T @ shared
+            shared = deviations.T @ members / (count - 1)  # (A HAᵀ)ᵀ / (E - 1) of Eq. 3.5
+            moved = score.solve((values + noise - readings).T).T @ shared
+            members = np.add(moved, members, out=moved)
         members[:, 0] = self.model.phase.confine(members[:, 0])
         return replace(belief, carried=members), StepInfo(score.log_likelihood, score.surprise)
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite, log, tau
 
 import numpy as np
 from jaxtyping import Float
 
+LOG_TAU = log(tau)
 ABSURD = 1e8  # standard deviations: numbers that would only blow the belief up
 
 
@@ -18,7 +20,7 @@ class InnovationScore:
     log_likelihood: float
     surprise: float
 
-    def solve(self, columns: Float[np.ndarray, "M *K"]) -> Float[np.ndarray, "M *K"]:
+    def solve(self, columns: Float[np.ndarray, "M ..."]) -> Float[np.ndarray, "M ..."]:
         """S⁻¹ @ columns."""
         from scipy.linalg.lapack import dpotrs
 
@@ -55,6 +57,6 @@ def innovation_score(innovation: Float[np.ndarray, " M"], cov: Float[np.ndarray,
     with np.errstate(over="ignore", invalid="ignore"):  # an absurd reading is caught below
         surprise = float(white @ white)
     log_det = 2 * float(np.log(root.diagonal()).sum())
-    if not (surprise <= ABSURD**2 * len(innovation) and np.isfinite(log_det)):
+    if not (surprise <= ABSURD**2 * len(innovation) and isfinite(log_det)):
         return None
-    return InnovationScore(root, -0.5 * (surprise + log_det + len(innovation) * np.log(2 * np.pi)), surprise)
+    return InnovationScore(root, -0.5 * (surprise + log_det + len(innovation) * LOG_TAU), surprise)

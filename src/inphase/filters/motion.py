@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from math import sqrt
+from functools import cache
 
 import numpy as np
 from jaxtyping import Float
 
-from inphase.phase import PhaseModel
+from inphase.phase import PhaseModel, unit_process_cov
 
 TINY = np.finfo(float).tiny
 
@@ -30,11 +30,16 @@ def advance(
     if dt == 0:
         return states
     size = len(phase.mean)
-    noise = rng.standard_normal((len(states), size)) @ root(phase.process_cov(dt)).T
+    noise = rng.standard_normal((len(states), size)) @ _unit_root(phase.order).T * phase.process_scale(dt)
     moved = states.copy()
     moved[:, :size] = states[:, :size] @ phase.transition(dt).T + noise
     moved[:, 0] = phase.confine(moved[:, 0])
     return moved
+
+
+@cache
+def _unit_root(order: int) -> Float[np.ndarray, "K K"]:
+    return root(unit_process_cov(order))
 
 
 def root(cov: Float[np.ndarray, "K K"]) -> Float[np.ndarray, "K K"]:
@@ -43,10 +48,5 @@ def root(cov: Float[np.ndarray, "K K"]) -> Float[np.ndarray, "K K"]:
     Symmetric but for the scale: of all roots, the one that hardly moves when the covariance hardly does.
     """
     scale = np.sqrt(np.maximum(cov.diagonal(), TINY))
-    if len(cov) == 2:  # phase and tempo, as most have it: the root of [[1, c], [c, 1]] in closed form
-        together = min(max(float(cov[0, 1] / (scale[0] * scale[1])), -1.0), 1.0)
-        apart = 1 + sqrt(1 - together**2)
-        both = np.array([[apart, together], [together, apart]]) / sqrt(2 * apart)
-        return np.asarray(np.sqrt(np.maximum(cov.diagonal(), 0.0))[:, None] * both)
     value, vector = np.linalg.eigh(cov / np.outer(scale, scale))
     return np.asarray(scale[:, None] * ((vector * np.sqrt(np.maximum(value, 0.0))) @ vector.T))

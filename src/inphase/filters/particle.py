@@ -36,7 +36,7 @@ class WeightedBelief:
     log_weights: Float[np.ndarray, " P"]
 
     def __post_init__(self) -> None:
-        for array in (self.moving, self.origin, self.log_weights):
+        for array in (self.moving, self.drawn, self.origin, self.log_weights):
             array.setflags(write=False)
 
     @property
@@ -75,9 +75,7 @@ class WeightedBelief:
     def weights_mean(self) -> Float[np.ndarray, " B"]:
         return frozen(np.bincount(self.origin, self.weights, minlength=len(self.drawn)) @ self.drawn)
 
-    def readings(
-        self, phases: Float[np.ndarray, "P S"], features: Int[np.ndarray, " M"]
-    ) -> Float[np.ndarray, "P S M"]:
+    def readings(self, phases: Float[np.ndarray, "P S"], features: Int[np.ndarray, " M"]) -> Float[np.ndarray, "P S M"]:
         """What every particle reads at phases of its own."""
         return self.model.layout.predict_each(phases, self.drawn, features, self.origin)
 

@@ -57,7 +57,7 @@ class PrompBelief:
         off = self._moving - self.phase_mean
         return frozen((off * self.timing.weights[:, None]).T @ off + np.diag([0.0, self.timing.tempo_var]))
 
-    @property
+    @cached_property
     def weights_mean(self) -> Float[np.ndarray, " B"]:
         means = self.weights.means
         mean = means[0] if len(means) == 1 else self.timing.weights @ means
@@ -144,17 +144,11 @@ class Promp:
         self, belief: PrompBelief, observation: Observation
     ) -> tuple[Float[np.ndarray, "P M"], Float[np.ndarray, "P M"]]:
         """What this partner is expected to read on a grid of phases, and its variance, noise included."""
-        features, weights = observation.features, belief.weights
-        plain, curves = self._curves
-        rows = curves[:, :, features]
-        var = np.maximum((rows * (weights.covs @ rows)).sum(1), 0.0) + self.model.noise.var[features]
-        return plain[:, features] + (weights.means[:, None] @ rows)[:, 0], var
-
-    @cached_property
-    def _curves(self) -> tuple[Float[np.ndarray, "P F"], Float[np.ndarray, "P R F"]]:
-        """The mean trajectory and the prior's directions on a grid of phases."""
-        phases, prior = grid(self.model.phase, PHASES), self.model.prior
-        return self.model.layout.predict(phases, prior.mean), self.model.layout.project_each(phases, prior.factor)
+        layout, prior, features = self.model.layout, self.model.prior, observation.features
+        phases = grid(self.model.phase, PHASES)
+        mean = layout.predict(phases, belief.weights_mean, features)
+        var = layout.variance(phases, prior.factor, belief.weights.covs[0], features)
+        return mean, np.maximum(var, 0.0) + self.model.noise.var[features]
 
     def _fitted(
         self, belief: PrompBelief, observation: Observation, unseen: Float[np.ndarray, " F"]

@@ -55,7 +55,7 @@ class Scaling:
         """The scaling of `count` features that leaves them as they are."""
         return cls(np.zeros(count), np.ones(count))
 
-    @property
+    @cached_property
     def offset(self) -> Float[np.ndarray, " F"]:
         """(F,) what becomes 0."""
         return self.low

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float, Int
 
-from inphase.reflex import Reflex, place, similarity
+from inphase.reflex import Reflex, kernel, place
 
 LAGS = np.array([0.0, 0.2])  # [s]: where the partner is, and how he came there, within a person's reaction
 SPEEDS = (0.5, 1.0, 2.0)  # at which a partner may move: a regression must not take a slow hand for another place
@@ -95,8 +95,10 @@ def _chosen(
 
 
 def _inverse(places: Float[np.ndarray, "n P"], width: float, trend: float, ridge: float) -> Float[np.ndarray, "n n"]:
-    kernel = similarity(places, places, width) + trend * places @ places.T
-    return np.linalg.inv(kernel + ridge * np.eye(len(kernel)))
+    inner = places @ places.T
+    lengths = inner.diagonal()
+    alike = kernel(lengths[:, None] + lengths - 2 * inner, width) + trend * inner
+    return np.linalg.inv(alike + ridge * np.eye(len(alike)))
 
 
 def _held_out(
