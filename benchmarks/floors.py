@@ -98,15 +98,15 @@ def rbpf(model: inphase.Model, members: int, seen: int) -> Callable[[], object]:
 def promp(model: inphase.Model, members: int, seen: int) -> Callable[[], object]:
     """What is expected along the reference and at the nodes, with its variance, and one update of the weights."""
     basis, directions = model.layout.bases[0], len(model.prior.factor)
-    cov, phases = some_cov(directions), RNG.random(NODES)
+    cov, phases, grid = some_cov(directions), RNG.random(NODES), RNG.random(PHASES)
     weights = RNG.random((basis.size, directions * seen))
-    along, at_nodes = RNG.random((PHASES, directions, seen)), RNG.random((NODES, directions, seen))
+    own, at_nodes = RNG.random((seen, basis.size, directions)), RNG.random((NODES, directions, seen))
     across = RNG.random((seen, directions))
     innovation_covs, innovation_cov = np.tile(some_cov(seen), (NODES, 1, 1)), some_cov(seen)
 
     def work() -> None:
+        basis(grid) @ ((own @ cov) @ own.swapaxes(1, 2))
         basis(phases) @ weights
-        cov @ along
         at_nodes.transpose(0, 2, 1) @ (cov @ at_nodes)
         np.linalg.cholesky(innovation_covs)
         cross = across @ cov

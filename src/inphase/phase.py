@@ -104,7 +104,7 @@ class PhaseModel:
 
     def process_scale(self, dt: float) -> Float[np.ndarray, " K"]:
         """(K,) what the rows and columns of `unit_process_cov` are multiplied by, dt [s] later."""
-        return np.asarray(sqrt(self.diffusion) * dt ** (np.arange(self.order, -1, -1) + 0.5))
+        return np.asarray(sqrt(self.diffusion) * dt ** _half_powers(self.order))
 
     def confine(self, phases: Float[np.ndarray, "*E"]) -> Float[np.ndarray, "*E"]:
         """Phases brought back to where they make sense: into [0, 1], or when periodic within half a turn of their mean.
@@ -123,6 +123,11 @@ def unit_process_cov(order: int) -> Float[np.ndarray, "K K"]:
     """(K, K) the noise of a process of that order, a second later, at a spectral density of 1."""
     left = range(order, -1, -1)
     return frozen([[1 / (factorial(i) * factorial(j) * (i + j + 1)) for j in left] for i in left])
+
+
+@cache
+def _half_powers(order: int) -> Float[np.ndarray, " K"]:
+    return frozen(np.arange(order, -1, -1) + 0.5)
 
 
 @cache

@@ -45,6 +45,7 @@ class Session:
         self._shown = np.arange(model.observed_features)
         self._answered = self._columns(model.controlled)
         self.reset()
+        self._warm_up()
 
     def __repr__(self) -> str:
         return f"Session({self._filter.__class__.__name__.lower()} of {self.model!r}, time={self._time})"
@@ -62,6 +63,14 @@ class Session:
         self._misfit = 1.0
         self._finished = False
         self._refused = False
+
+    def _warm_up(self) -> None:
+        """Do what is done once, so that the first sample of a partner need not wait for it."""
+        begun = self.model.predict(self.model.phase.confine(self.model.phase.mean[:1]))[0, : len(self.model.observed)]
+        for time in (0.0, 0.01 * self._typical_duration):
+            self.observe(time, begun)
+            self.respond(samples=2)
+        self.reset()
 
     @property
     def belief(self) -> Belief:

@@ -64,8 +64,6 @@ class Layout:
 
     def leading(self, count: int) -> Layout:
         """The layout of the first `count` features alone; their weights are the first, too."""
-        if count == self.count:
-            return self
         part = self._leading.get(count)
         if part is None:
             part = self._leading[count] = Layout(self.bases[:count])
@@ -111,9 +109,22 @@ class Layout:
         features: Int[np.ndarray, " M"] | None = None,
     ) -> Float[np.ndarray, "P M"]:
         """(P, M) ∂h/∂φ: the first column of H in Eq. 2.6."""
-        plan = self._plan(features, weights)
-        parts = [block.basis.with_derivative(phases)[1] @ block.weights(weights).T for block in plan.blocks]
-        return plan.join(parts, phases.shape)
+        return self.predict_and_slope(phases, weights, features)[1]
+
+    def predict_and_slope(
+        self,
+        phases: Float[np.ndarray, " P"],
+        weights: Float[np.ndarray, " B"],
+        features: Int[np.ndarray, " M"] | None = None,
+    ) -> tuple[Float[np.ndarray, "P M"], Float[np.ndarray, "P M"]]:
+        """(P, M) h(φ, w) and (P, M) ∂h/∂φ."""
+        plan, values, slopes = self._plan(features, weights), [], []
+        for block in plan.blocks:
+            value, slope = block.basis.with_derivative(phases)
+            own = block.weights(weights).T
+            values.append(value @ own)
+            slopes.append(slope @ own)
+        return plan.join(values, phases.shape), plan.join(slopes, phases.shape)
 
     def project(
         self, phase: float, rows: Float[np.ndarray, "N B"], features: Int[np.ndarray, " M"] | None = None

@@ -100,10 +100,9 @@ class GaussianBelief:
     ) -> tuple[Float[np.ndarray, "S M"], Float[np.ndarray, "S M"]]:
         layout, factor, weights = self.model.layout, self.model.prior.factor, self.weights_mean
         phases = self.model.phase.confine(course.share * self.mean[0] + course.offset)
-        mean = layout.predict(phases, weights, features)
-        slope = layout.slope(phases, weights, features) * course.share[:, None]
+        mean, slope = layout.predict_and_slope(phases, weights, features)
         rows = np.zeros((*mean.shape, len(self.mean)))  # the Jacobian of Eq. 2.6, in the prior's directions
-        rows[..., 0] = slope
+        rows[..., 0] = slope * course.share[:, None]
         rows[..., self._size :] = layout.project_each(phases, factor, features).transpose(0, 2, 1)
         return mean, np.maximum(((rows @ self.cov) * rows).sum(2), 0.0)
 
@@ -129,7 +128,9 @@ class EnsembleBelief:
     @cached_property
     def members(self) -> Float[np.ndarray, "E n"]:
         """(E, K + B) the states."""
-        return self._whole(self.carried)
+        members = _unmixed(self.carried, self.roots)
+        members.setflags(write=False)
+        return members
 
     @cached_property
     def phase_mean(self) -> Float[np.ndarray, " K"]:
@@ -142,7 +143,7 @@ class EnsembleBelief:
 
     @cached_property
     def weights_mean(self) -> Float[np.ndarray, " B"]:
-        return frozen(self._whole(self.carried.mean(0))[self._size :])
+        return frozen(_unmixed(self.carried.mean(0), self.roots)[self._size :])
 
     def readings(self, phases: Float[np.ndarray, "E S"], features: Int[np.ndarray, " M"]) -> Float[np.ndarray, "E S M"]:
         """What every member reads at phases of its own."""
@@ -164,11 +165,13 @@ class EnsembleBelief:
     def _size(self) -> int:
         return len(self.model.phase.mean)
 
-    def _whole(self, carried: Float[np.ndarray, "*E _"]) -> Float[np.ndarray, "*E n"]:
-        if self.roots is None:
-            return carried
-        mixed = len(self.roots)
-        return frozen(np.concatenate([carried[..., :-mixed], carried[..., -mixed:] @ self.roots], axis=-1))
+
+def _unmixed(carried: Float[np.ndarray, "*E _"], roots: Float[np.ndarray, "Q Bc"] | None) -> Float[np.ndarray, "*E n"]:
+    """States of which the last columns say how roots are mixed, with the mixtures themselves."""
+    if roots is None:
+        return carried
+    kept = carried.shape[-1] - len(roots)
+    return np.concatenate([carried[..., :kept], carried[..., kept:] @ roots], axis=-1)
 
 
 def ensemble(model: Model, members: Float[np.ndarray, "E n"]) -> EnsembleBelief:

@@ -59,10 +59,10 @@ class Bip:
         mean, cov = predicted.mean, predicted.cov
         phase, weights = mean[:1], predicted.weights_mean
         jacobian = np.empty((len(features), len(mean)))  # H of Eq. 2.6, in the prior's directions
-        jacobian[:, 0] = model.layout.slope(phase, weights, features)[0]
+        (plain,), (jacobian[:, 0],) = model.layout.predict_and_slope(phase, weights, features)
         jacobian[:, 1:size] = 0.0
         jacobian[:, size:] = model.layout.project(float(phase[0]), model.prior.factor, features).T
-        innovation = observation.values - model.layout.predict(phase, weights, features)[0]
+        innovation = observation.values - plain
         cross = cov @ jacobian.T
         innovation_cov = jacobian @ cross  # S, Eq. 2.7
         innovation_cov.flat[:: len(features) + 1] += observation.noise_var

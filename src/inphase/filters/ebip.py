@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -67,7 +67,7 @@ class Ebip:
         """Eq. 3.1; only the phase and its derivatives move."""
         if dt == 0:
             return belief
-        return replace(belief, carried=advance(belief.carried, self.model.phase, dt, rng))
+        return EnsembleBelief(self.model, advance(belief.carried, self.model.phase, dt, rng), belief.roots)
 
     def step(
         self, belief: EnsembleBelief, observation: Observation, dt: float, rng: np.random.Generator
@@ -99,7 +99,7 @@ class Ebip:
             moved = score.solve((values + noise - readings).T).T @ shared
             members = np.add(moved, members, out=moved)
         members[:, 0] = self.model.phase.confine(members[:, 0])
-        return replace(belief, carried=members), StepInfo(score.log_likelihood, score.surprise)
+        return EnsembleBelief(self.model, members, belief.roots), StepInfo(score.log_likelihood, score.surprise)
 
 
 def _contracted(around: Float[np.ndarray, "E n"], deviations: Float[np.ndarray, "E M"]) -> Float[np.ndarray, "E n"]:

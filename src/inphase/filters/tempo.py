@@ -85,12 +85,8 @@ def advance(motion: Motion, phase: PhaseModel, tempo: Tempo, dt: float, rng: np.
 
 def _step(motion: Motion, phase: PhaseModel, tempo: Tempo, dt: float, rng: np.random.Generator) -> Motion:
     count, typical = len(motion.phase), phase.nominal_velocity * dt
-
-    def happens(rate: float) -> Bool[np.ndarray, " P"]:
-        return np.asarray(rng.random(count) < -np.expm1(-rate * typical))
-
-    changes, begins = happens(tempo.change_rate), happens(tempo.stretch_rate)
-    stops, goes = happens(tempo.stop_rate), happens(tempo.go_rate)
+    rates = (tempo.change_rate, tempo.stretch_rate, tempo.stop_rate, tempo.go_rate)
+    changes, begins, stops, goes = (rng.random(count) < -np.expm1(-rate * typical) for rate in rates)
     own = _mixed(count, tempo.usual, tempo.usual_std, tempo.other_std, rng)
     momentary = _mixed(count, tempo.steady, tempo.momentary_std, tempo.other_std, rng)
     moved = replace(
