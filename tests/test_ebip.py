@@ -14,6 +14,8 @@ from scipy.stats import multivariate_normal
 import inphase
 from inphase.errors import OptionError
 from inphase.filters import Course, EnsembleBelief, make
+from inphase.filters.belief import ensemble
+from inphase.filters.gaussian import spread_score
 from inphase.observation import Observation
 
 PRIORS = pytest.mark.parametrize("prior", ["demonstrations", "gaussian", "mixture"])
@@ -137,6 +139,47 @@ def test_members_are_told_apart_by_nothing_but_their_state(seed: int, count: int
     after, _ = filter.step(before, seen, 0.0, ANYONE)
     shuffled, _ = filter.step(EnsembleBelief(model, before.members[order]), seen, 0.0, ANYONE)
     np.testing.assert_allclose(shuffled.members, after.members[order], atol=1e-10)
+
+
+@UPDATES
+@pytest.mark.parametrize("features", [[0, 1], [0, 3], [2, 3]])
+def test_how_the_controlled_weights_are_carried_makes_no_difference(
+    update: str, features: list[int], rng: np.random.Generator
+) -> None:
+    model = chance_model(rng, phase_model())
+    plain = some_members(model, 5, rng)
+    mixed = ensemble(model, plain.members)
+    assert mixed.roots is not None
+    assert mixed.carried.shape[1] < plain.carried.shape[1]
+    filter, everything = make("ebip", model, update=update), np.arange(model.layout.count)
+    for step in range(5):
+        seen = seen_near(plain, np.array(features), np.array([0.1, 0.3]), rng)
+        plain, mixed = (filter.step(b, seen, 0.01, np.random.default_rng(step))[0] for b in (plain, mixed))
+        np.testing.assert_allclose(mixed.members, plain.members, atol=1e-11)
+        np.testing.assert_allclose(mixed.weights_mean, plain.weights_mean, atol=1e-11)
+        course = Course(np.array([1.0, 0.5]), np.array([0.0, 0.5]))
+        for told in (everything, everything[:2], everything[-1:]):
+            for got, expected in zip(mixed.trajectory(course, told), plain.trajectory(course, told), strict=True):
+                np.testing.assert_allclose(got, expected, atol=1e-11)
+
+
+@settings(max_examples=50)
+@given(SEEDS, st.integers(1, 8), st.integers(1, 8), st.floats(-6, 2))
+def test_a_sample_is_scored_in_the_smaller_of_members_and_readings(
+    seed: int, members: int, readings: int, noise: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    spread, noise_var = rng.standard_normal((members, readings)), 10**noise * rng.uniform(0.5, 2.0, readings)
+    cov = spread.T @ spread + np.diag(noise_var)
+    innovation = np.linalg.cholesky(cov) @ rng.standard_normal(readings)
+    score = spread_score(innovation, spread, noise_var)
+    assert score is not None
+    expected = multivariate_normal.logpdf(innovation, np.zeros(readings), cov, allow_singular=False)
+    assert score.log_likelihood == pytest.approx(expected, abs=1e-6)
+    assert score.surprise == pytest.approx(innovation @ np.linalg.solve(cov, innovation), abs=1e-6)
+    columns = rng.standard_normal((readings, 3))
+    for right in (columns, columns[:, 0]):
+        np.testing.assert_allclose(cov @ score.solve(right), right, atol=1e-6)
 
 
 def test_chance_has_no_part_in_a_square_root_update(rng: np.random.Generator) -> None:

@@ -45,7 +45,14 @@ def test_all_methods_equal_the_dense_matrix(bases: tuple[Basis, ...], seed: int)
     predicted = layout.predict(phases, weights, features)
     np.testing.assert_allclose(predicted, [matrix @ weights for matrix in matrices], atol=1e-12)
 
+    told, slopes = layout.predict_and_slope(phases, weights, features)
+    np.testing.assert_array_equal(told, predicted)
+    np.testing.assert_array_equal(slopes, layout.slope(phases, weights, features))
+
     rows, columns = rng.normal(size=(3, layout.size)), rng.normal(size=(len(chosen), 2))
+    root = rng.normal(size=(3, 3))
+    var = [np.diag(matrix @ rows.T @ root @ root.T @ rows @ matrix.T) for matrix in matrices]
+    np.testing.assert_allclose(layout.variance(phases, rows, root @ root.T, features), var, atol=1e-11)
     for phase, matrix in zip(phases, matrices, strict=True):
         at = float(phase)
         np.testing.assert_allclose(layout.project(at, rows, features), rows @ matrix.T, atol=1e-12)
@@ -74,6 +81,21 @@ def test_each_member_is_predicted_at_its_own_phases(bases: tuple[Basis, ...], se
     phases, weights = rng.uniform(-0.2, 1.2, (6, 3)), rng.normal(size=(6, layout.size))
     one_by_one = [layout.predict(p, w, features) for p, w in zip(phases, weights, strict=True)]
     np.testing.assert_allclose(layout.predict_each(phases, weights, features), one_by_one, atol=1e-12)
+
+
+@settings(max_examples=40)
+@given(BASES, SEEDS)
+def test_members_may_share_weights_and_the_first_features_stand_alone(bases: tuple[Basis, ...], seed: int) -> None:
+    layout, rng = Layout(bases), np.random.default_rng(seed)
+    weights, which, phases = rng.normal(size=(3, layout.size)), rng.integers(0, 3, 7), rng.uniform(0, 1, (7, 2))
+    each = layout.predict_each(phases, weights[which])
+    np.testing.assert_array_equal(layout.predict_each(phases, weights, which=which), each)
+    count = int(rng.integers(1, layout.count + 1))
+    first = layout.leading(count)
+    assert first.bases == layout.bases[:count]
+    np.testing.assert_allclose(
+        first.predict_each(phases, weights[which][:, : first.size]), each[:, :, :count], atol=1e-12
+    )
 
 
 @settings(max_examples=40)

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from inphase.errors import OptionError, listing
 from inphase.filters.belief import EnsembleBelief, ensemble
 from inphase.filters.filter import StepInfo
-from inphase.filters.gaussian import innovation_score
+from inphase.filters.gaussian import spread_score
 from inphase.filters.motion import advance, begin
 from inphase.mixture import Mixture
 from inphase.model import Model
@@ -82,9 +82,7 @@ class Ebip:
         mean = readings.sum(0) / count
         deviations = readings - mean  # HA, Eq. 3.3
         deviations -= deviations.sum(0) / count  # of their rounding, so that members need not be centred below
-        innovation_cov = deviations.T @ deviations / (count - 1)
-        innovation_cov.flat[:: len(values) + 1] += observation.noise_var  # S, Eq. 3.4
-        score = innovation_score(values - mean, innovation_cov)
+        score = spread_score(values - mean, deviations / np.sqrt(count - 1), observation.noise_var)  # S, Eq. 3.4
         if score is None:
             return belief, StepInfo(healthy=False)
         if self.update == "square-root":

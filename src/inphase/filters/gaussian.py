@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite, log, tau
 
 import numpy as np
 from jaxtyping import Float
+
+from inphase.arrays import FloatArray
 
 LOG_TAU = log(tau)
 ABSURD = 1e8  # standard deviations: numbers that would only blow the belief up
@@ -14,17 +17,11 @@ ABSURD = 1e8  # standard deviations: numbers that would only blow the belief up
 
 @dataclass(frozen=True)
 class InnovationScore:
-    """How well a sample fitted its prediction, and the means to divide by its covariance."""
+    """How well a sample fitted its prediction, and `solve`, which divides columns (M, K) by its covariance S."""
 
-    root: Float[np.ndarray, "M M"]
     log_likelihood: float
     surprise: float
-
-    def solve(self, columns: Float[np.ndarray, "M ..."]) -> Float[np.ndarray, "M ..."]:
-        """S⁻¹ @ columns."""
-        from scipy.linalg.lapack import dpotrs
-
-        return np.asarray(dpotrs(self.root, columns, lower=1)[0])
+    solve: Callable[[FloatArray], FloatArray]
 
 
 def forward(roots: Float[np.ndarray, "P M M"], columns: Float[np.ndarray, "P M K"]) -> Float[np.ndarray, "P M K"]:
@@ -48,7 +45,7 @@ def innovation_score(innovation: Float[np.ndarray, " M"], cov: Float[np.ndarray,
     None where S is no covariance, or the innovation so many standard deviations off that it is no reading.
     """
     # LAPACK itself: what numpy and scipy put around it takes longer than a small sample does.
-    from scipy.linalg.lapack import dpotrf, dtrtrs
+    from scipy.linalg.lapack import dpotrf, dpotrs, dtrtrs
 
     root, refused = dpotrf(cov, lower=1)
     if refused:
@@ -57,6 +54,45 @@ def innovation_score(innovation: Float[np.ndarray, " M"], cov: Float[np.ndarray,
     with np.errstate(over="ignore", invalid="ignore"):  # an absurd reading is caught below
         surprise = float(white @ white)
     log_det = 2 * float(np.log(root.diagonal()).sum())
-    if not (surprise <= ABSURD**2 * len(innovation) and isfinite(log_det)):
+    return _score(len(innovation), surprise, log_det, lambda columns: dpotrs(root, columns, lower=1)[0])
+
+
+def spread_score(
+    innovation: Float[np.ndarray, " M"], spread: Float[np.ndarray, "E M"], noise_var: Float[np.ndarray, " M"]
+) -> InnovationScore | None:
+    """The same for S = spreadᵀ spread + diag(noise_var), as an ensemble has it.
+
+    With fewer members than readings, by a system that is as small as the ensemble (matrix inversion lemma).
+    """
+    from scipy.linalg.lapack import dpotrf, dpotrs, dtrtrs
+
+    if len(innovation) <= len(spread):
+        cov = spread.T @ spread
+        cov.flat[:: len(innovation) + 1] += noise_var
+        return innovation_score(innovation, cov)
+    stds = np.sqrt(noise_var)
+    rows = spread / stds  # Z, S = √R (I + Zᵀ Z) √R
+    inner = rows @ rows.T
+    inner.flat[:: len(rows) + 1] += 1.0
+    root, refused = dpotrf(inner, lower=1)
+    if refused:
         return None
-    return InnovationScore(root, -0.5 * (surprise + log_det + len(innovation) * LOG_TAU), surprise)
+    white = innovation / stds
+    with np.errstate(over="ignore", invalid="ignore"):  # an absurd reading is caught below
+        explained = dtrtrs(root, rows @ white, lower=1)[0]
+        surprise = float(white @ white - explained @ explained)
+    log_det = 2 * float(np.log(root.diagonal()).sum() + np.log(stds).sum())
+
+    def solve(columns: FloatArray) -> FloatArray:
+        scaled = (columns.T / stds).T
+        return np.asarray(((scaled - rows.T @ dpotrs(root, rows @ scaled, lower=1)[0]).T / stds).T)
+
+    return _score(len(innovation), surprise, log_det, solve)
+
+
+def _score(
+    size: int, surprise: float, log_det: float, solve: Callable[[FloatArray], FloatArray]
+) -> InnovationScore | None:
+    if not (surprise <= ABSURD**2 * size and isfinite(log_det)):
+        return None
+    return InnovationScore(-0.5 * (surprise + log_det + size * LOG_TAU), surprise, solve)

@@ -12,7 +12,7 @@ from inphase.arrays import frozen
 from inphase.errors import OptionError, listing
 from inphase.filters.belief import Course
 from inphase.filters.filter import StepInfo
-from inphase.filters.gaussian import innovation_score
+from inphase.filters.gaussian import spread_score
 from inphase.filters.motion import advance, begin
 from inphase.filters.resampling import effective_size, systematic
 from inphase.model import Model
@@ -144,9 +144,7 @@ class Particle:
         readings = belief.readings(belief.moving[:, :1], observation.features)[:, 0]
         mean = weights @ readings
         off = readings - mean
-        innovation_cov = (off * weights[:, None]).T @ off
-        innovation_cov.flat[:: len(noise_var) + 1] += noise_var
-        score = innovation_score(observation.values - mean, innovation_cov)
+        score = spread_score(observation.values - mean, off * np.sqrt(weights)[:, None], noise_var)
         with np.errstate(over="ignore"):  # an absurd reading is caught below
             squared = (observation.values - readings) ** 2 @ (1 / noise_var)
         log_weights = belief.log_weights - 0.5 * (squared + np.log(2 * np.pi * noise_var).sum())
