@@ -28,7 +28,7 @@ def floor(filter_name: str, model: inphase.Model, members: int, features: Array)
 def ebip(model: inphase.Model, members: int, seen: int) -> Callable[[], object]:
     """Readings of every member, their covariance, its factor, and the gain times the innovations (Eq. 3.2 to 3.7)."""
     basis, phases = model.layout.bases[0], RNG.random((members, 1))
-    partner = model.layout.leading(model.observed_features).size
+    partner = model.layout.split(model.observed_features)[0].size
     carried = RNG.random((members, 2 + partner + min(members, model.layout.size - partner)))
     weights, readings = RNG.random((members, basis.size, seen)), RNG.random((members, seen))
     cov = some_cov(seen)

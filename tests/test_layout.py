@@ -85,14 +85,18 @@ def test_each_member_is_predicted_at_its_own_phases(bases: tuple[Basis, ...], se
 
 @settings(max_examples=40)
 @given(BASES, SEEDS)
-def test_members_may_share_weights_and_the_first_features_stand_alone(bases: tuple[Basis, ...], seed: int) -> None:
+def test_members_may_share_weights_and_features_may_be_split(bases: tuple[Basis, ...], seed: int) -> None:
     layout, rng = Layout(bases), np.random.default_rng(seed)
     weights, which, phases = rng.normal(size=(3, layout.size)), rng.integers(0, 3, 7), rng.uniform(0, 1, (7, 2))
     each = layout.predict_each(phases, weights[which])
     np.testing.assert_array_equal(layout.predict_each(phases, weights, which=which), each)
-    count = int(rng.integers(1, layout.count + 1))
-    first = layout.leading(count)
-    assert first.bases == layout.bases[:count]
+    if layout.count == 1:
+        return
+    count = int(rng.integers(1, layout.count))
+    first, others = layout.split(count)
+    assert first.bases + others.bases == layout.bases
+    own = weights[which][:, first.size :]
+    np.testing.assert_allclose(others.predict_each(phases, own), each[:, :, count:], atol=1e-12)
     np.testing.assert_allclose(
         first.predict_each(phases, weights[which][:, : first.size]), each[:, :, :count], atol=1e-12
     )

@@ -16,7 +16,7 @@ from jaxtyping import Float, Int
 from inphase.arrays import freeze, frozen
 from inphase.errors import OptionError
 
-NEAR = 4  # power of the similarity by which places tell of the error: only those close by
+TINY = np.finfo(float).tiny
 DOUBT = 3.0  # places' worth of the error everywhere
 
 
@@ -86,7 +86,7 @@ class Reflex:
         inner = self.places @ here
         alike = kernel(here @ here + self._lengths - 2 * inner, self.width)
         mean = self.mean + (alike + self.trend * inner) @ self.gains
-        near = alike**NEAR
+        near = (alike * alike) ** 2  # only those close by tell of the error
         # Where nobody was near, the error is that of everywhere.
         var = (near @ self.error_var + DOUBT * self._usual_error_var) / (near.sum() + DOUBT)
         return mean, var
@@ -147,12 +147,12 @@ class Memory:
 
     def at(self, times: Float[np.ndarray, " L"]) -> Float[np.ndarray, "L Fo"]:
         """The features at these times, linear between samples; before a feature's first reading, as it first read."""
-        right = np.clip(np.searchsorted(self.times, times), 1, max(len(self.times) - 1, 1))
-        right = np.minimum(right, len(self.times) - 1)
+        right = np.minimum(np.maximum(self.times.searchsorted(times), 1), len(self.times) - 1)
         left = np.maximum(right - 1, 0)
-        step = np.maximum(self.times[right] - self.times[left], np.finfo(float).tiny)
-        share = np.clip((times - self.times[left]) / step, 0.0, 1.0)[:, None]
-        known = np.isfinite(self.moments)
-        first = self.moments[known.argmax(0), np.arange(self.moments.shape[1])]
-        filled = np.where(known, self.moments, first)
+        step = np.maximum(self.times[right] - self.times[left], TINY)
+        share = np.minimum(np.maximum((times - self.times[left]) / step, 0.0), 1.0)[:, None]
+        filled = self.moments
+        if np.isnan(filled[0]).any():  # what was read once is known ever after
+            known = np.isfinite(filled)
+            filled = np.where(known, filled, filled[known.argmax(0), np.arange(filled.shape[1])])
         return np.asarray((1 - share) * filled[left] + share * filled[right])

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy.typing import ArrayLike
 
+from inphase.arrays import frozen
 from inphase.channels import match
 from inphase.errors import ObservationError, OptionError, listing
 from inphase.filters import RECOMMENDED, Belief, Course, StepInfo, make
@@ -128,7 +130,7 @@ class Session:
         mean, var = np.zeros((samples, model.coordinates.count)), np.zeros((samples, model.coordinates.count))
         phase, velocity = self._belief.phase_mean[0], self._velocity()[0]
         phases = course.share * phase + course.offset
-        phases = phases if model.phase.periodic else np.clip(phases, 0.0, 1.0)
+        phases = phases if model.phase.periodic else np.minimum(np.maximum(phases, 0.0), 1.0)
         ahead = phases - phase
         if model.phase.periodic:
             ahead += max(np.ceil(phase - phases[0]), 0.0)  # a phase that has passed comes again in the next cycle
@@ -257,7 +259,7 @@ class Session:
             raise OptionError(f"expected a start phase between 0 and 1, got {start}")
         if start is not None and lookahead != 0:
             raise OptionError(f"give either start or lookahead, got start={start} and lookahead={lookahead}")
-        steps = np.linspace(0.0, 1.0, samples)
+        steps = _steps(int(samples))
         if self.model.phase.periodic:
             return Course(np.full(samples, float(start is None)), (start or lookahead) + steps)
         if start is not None:
@@ -313,6 +315,11 @@ class Session:
             return Status.UNLIKE
         self._finished = phase >= (AGAIN_BELOW if self._finished else FINISHED_AT) and not self.model.phase.periodic
         return Status.FINISHED if self._finished else Status.FOLLOWING
+
+
+@lru_cache(maxsize=16)
+def _steps(samples: int) -> Float[np.ndarray, " S"]:
+    return frozen(np.linspace(0.0, 1.0, samples))
 
 
 def _number(value: object, name: str) -> float:

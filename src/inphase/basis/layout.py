@@ -62,15 +62,15 @@ class Layout:
         ends = accumulate((basis.size for basis in self.bases), initial=0)
         return tuple(slice(start, end) for start, end in pairwise(ends))
 
-    def leading(self, count: int) -> Layout:
-        """The layout of the first `count` features alone; their weights are the first, too."""
-        part = self._leading.get(count)
-        if part is None:
-            part = self._leading[count] = Layout(self.bases[:count])
-        return part
+    def split(self, count: int) -> tuple[Layout, Layout]:
+        """The layouts of the first `count` features and of the others; their weights are split in the same order."""
+        parts = self._splits.get(count)
+        if parts is None:
+            parts = self._splits[count] = Layout(self.bases[:count]), Layout(self.bases[count:])
+        return parts
 
     @cached_property
-    def _leading(self) -> dict[int, Layout]:
+    def _splits(self) -> dict[int, tuple[Layout, Layout]]:
         return {}
 
     def predict(

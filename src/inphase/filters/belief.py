@@ -128,9 +128,9 @@ class EnsembleBelief:
     @cached_property
     def members(self) -> Float[np.ndarray, "E n"]:
         """(E, K + B) the states."""
-        members = _unmixed(self.carried, self.roots)
-        members.setflags(write=False)
-        return members
+        if self.roots is None:
+            return self.carried
+        return frozen(np.concatenate([self.carried[:, : -len(self.roots)], self._mixed], axis=1))
 
     @cached_property
     def phase_mean(self) -> Float[np.ndarray, " K"]:
@@ -143,15 +143,21 @@ class EnsembleBelief:
 
     @cached_property
     def weights_mean(self) -> Float[np.ndarray, " B"]:
-        return frozen(_unmixed(self.carried.mean(0), self.roots)[self._size :])
+        mean = self.carried[:, self._size :].mean(0)
+        if self.roots is None:
+            return frozen(mean)
+        kept = len(mean) - len(self.roots)
+        return frozen(np.concatenate([mean[:kept], mean[kept:] @ self.roots]))
 
     def readings(self, phases: Float[np.ndarray, "E S"], features: Int[np.ndarray, " M"]) -> Float[np.ndarray, "E S M"]:
         """What every member reads at phases of its own."""
         shown, layout = self.model.observed_features, self.model.layout
-        if self.roots is not None and len(features) and features[-1] < shown:
-            partner = layout.leading(shown)
-            return partner.predict_each(phases, self.carried[:, self._size : self._size + partner.size], features)
-        return layout.predict_each(phases, self.members[:, self._size :], features)
+        if self.roots is None or len(features) == 0 or features[0] < shown <= features[-1]:
+            return layout.predict_each(phases, self.members[:, self._size :], features)
+        partner, own = layout.split(shown)
+        if features[0] >= shown:
+            return own.predict_each(phases, self._mixed, features - shown)
+        return partner.predict_each(phases, self.carried[:, self._size : self._size + partner.size], features)
 
     def trajectory(
         self, course: Course, features: Int[np.ndarray, " M"]
@@ -159,24 +165,23 @@ class EnsembleBelief:
         phases = self.model.phase.confine(self.carried[:, :1] * course.share + course.offset)
         each = self.readings(phases, features)
         mean = each.sum(0) / len(each)
-        return mean, np.asarray(((each - mean) ** 2).sum(0) / (len(each) - 1))
+        off = each - mean
+        return mean, np.einsum("esm,esm->sm", off, off) / (len(each) - 1)
 
     @property
     def _size(self) -> int:
         return len(self.model.phase.mean)
 
-
-def _unmixed(carried: Float[np.ndarray, "*E _"], roots: Float[np.ndarray, "Q Bc"] | None) -> Float[np.ndarray, "*E n"]:
-    """States of which the last columns say how roots are mixed, with the mixtures themselves."""
-    if roots is None:
-        return carried
-    kept = carried.shape[-1] - len(roots)
-    return np.concatenate([carried[..., :kept], carried[..., kept:] @ roots], axis=-1)
+    @cached_property
+    def _mixed(self) -> Float[np.ndarray, "E Bc"]:
+        """The last weights, where they are carried as mixtures."""
+        roots = np.empty((0, 0)) if self.roots is None else self.roots
+        return np.asarray(self.carried[:, self.carried.shape[1] - len(roots) :] @ roots)
 
 
 def ensemble(model: Model, members: Float[np.ndarray, "E n"]) -> EnsembleBelief:
     """Members [φ, φ̇, …, w], carried in as few columns as they need."""
-    kept = len(model.phase.mean) + model.layout.leading(model.observed_features).size
+    kept = len(model.phase.mean) + model.layout.split(model.observed_features)[0].size
     if members.shape[1] - kept <= len(members):
         return EnsembleBelief(model, members)
     mixed = np.eye(len(members))
