@@ -9,7 +9,7 @@ PIP := PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt PIP_D
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint bench accuracy clean
+.PHONY: help demo test lint bench growth accuracy clean
 
 help:  ## what there is to make
 	@sed -n 's/^\([a-z]*\):.*##/make \1#/p' Makefile | while IFS='#' read -r target what; do printf '%-14s%s\n' "$$target" "$$what"; done
@@ -27,8 +27,12 @@ lint: $(VENV)/dev  ## style, types and arrows
 	$(if $(shell $(BIN)/python -c 'import sys; print("y" * (sys.version_info >= (3, 11)))' 2>/dev/null),$(BIN)/mypy,@echo "mypy: needs Python 3.11 or newer")
 	$(BIN)/lint-imports
 
-bench: $(VENV)/demo  ## how long a step takes
+bench: $(VENV)/demo  ## how long a step takes, beside plain loops and the floor; then a partner at 500 Hz
 	$(BIN)/python benchmarks/speed.py $(ARGS)
+	$(if $(ARGS),,$(BIN)/python benchmarks/live.py)
+
+growth: $(VENV)/demo  ## how the cost of a step grows: the picture in docs/performance.md
+	$(BIN)/python benchmarks/growth.py --output docs/pictures/growth.png $(ARGS)
 
 accuracy: $(VENV)/demo  ## how accurate the filters are on the recordings beside this folder: an hour or more
 	$(BIN)/python benchmarks/accuracy.py $(ARGS)

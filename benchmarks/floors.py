@@ -37,7 +37,7 @@ def ebip(model: inphase.Model, members: int, seen: int) -> Callable[[], object]:
         basis(phases) @ weights
         readings.T @ readings
         root, _ = dpotrf(cov, lower=1)
-        dpotrs(root, readings.T, lower=1)[0].T @ (readings.T @ carried)
+        np.linalg.multi_dot([dpotrs(root, readings.T, lower=1)[0].T, readings.T, carried])
 
     return work
 

@@ -93,8 +93,8 @@ class Ebip:
         else:
             # Eq. 3.6, 3.7. The perturbation has standard deviation √R: R is a variance.
             noise = rng.standard_normal(readings.shape) * stds
-            shared = deviations.T @ members / (count - 1)  # (A HAᵀ)ᵀ / (E - 1) of Eq. 3.5
-            moved = score.solve((values + noise - readings).T).T @ shared
+            shares = score.solve((values + noise - readings).T).T / (count - 1)
+            moved = np.linalg.multi_dot([shares, deviations.T, members])  # in the order that is less work
             members = np.add(moved, members, out=moved)
         members[:, 0] = self.model.phase.confine(members[:, 0])
         return EnsembleBelief(self.model, members, belief.roots), StepInfo(score.log_likelihood, score.surprise)
