@@ -184,5 +184,5 @@ def ensemble(model: Model, members: Float[np.ndarray, "E n"]) -> EnsembleBelief:
     kept = len(model.phase.mean) + model.layout.split(model.observed_features)[0].size
     if members.shape[1] - kept <= len(members):
         return EnsembleBelief(model, members)
-    mixed = np.eye(len(members))
-    return EnsembleBelief(model, np.concatenate([members[:, :kept], mixed], axis=1), members[:, kept:])
+    themselves = np.eye(len(members))
+    return EnsembleBelief(model, np.concatenate([members[:, :kept], themselves], axis=1), members[:, kept:])
