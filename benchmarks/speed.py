@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg  # noqa: F401 - so that no step has to wait for it
-from baseline import ATTEMPTS, MARGIN, gate, read_baseline, typical, write_baseline
+from baseline import MARGIN, MEASURED, gate, read_baseline, typical, write_baseline
 from session_rows import measure_session
 from sizes import SIZES, Size, make_model
 from step_rows import measure_memory, measure_step
@@ -81,11 +81,11 @@ def compare(options: argparse.Namespace) -> int:
         return ratios
 
     if options.write_baseline:
-        write_baseline(options.baseline, {row: typical([measure(row) for _ in range(ATTEMPTS)]) for row in rows})
+        write_baseline(options.baseline, {row: typical([measure(row) for _ in range(MEASURED)]) for row in rows})
         print(f"wrote {options.baseline}")
         return 0
-    worse = gate(read_baseline(options.baseline), rows, measure)
-    print("\n".join(worse) or f"no ratio is more than {MARGIN} times worse than in {options.baseline.name}")
+    worse = gate(read_baseline(options.baseline), rows, measure, options.margin)
+    print("\n".join(worse) or f"no ratio is more than {options.margin:g} times worse than in {options.baseline.name}")
     return int(bool(worse))
 
 
@@ -99,6 +99,7 @@ def parsed() -> argparse.Namespace:
     instead = parser.add_mutually_exclusive_group()
     instead.add_argument("--gate", action="store_true", help="compare the ratios with the baseline")
     instead.add_argument("--write-baseline", action="store_true", help="make the baseline of the ratios measured now")
+    parser.add_argument("--margin", type=float, default=MARGIN, help=f"times worse that pass, otherwise {MARGIN:g}")
     parser.add_argument("--baseline", type=Path, default=BASELINE, metavar="FILE", help=f"otherwise {BASELINE.name}")
     options = parser.parse_args()
     if options.gate and not options.baseline.exists():
