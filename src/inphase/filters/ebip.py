@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import sqrt
 
 import numpy as np
 from jaxtyping import Float
@@ -82,7 +83,7 @@ class Ebip:
         mean = readings.sum(0) / count
         deviations = readings - mean  # HA, Eq. 3.3
         deviations -= deviations.sum(0) / count  # of their rounding, so that members need not be centred below
-        score = spread_score(values - mean, deviations / np.sqrt(count - 1), observation.noise_var)  # S, Eq. 3.4
+        score = spread_score(values - mean, deviations / sqrt(count - 1), observation.noise_var)  # S, Eq. 3.4
         if score is None:
             return belief, StepInfo(healthy=False)
         if self.update == "square-root":

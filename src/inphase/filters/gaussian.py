@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from math import isfinite, log, tau
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -44,17 +46,15 @@ def innovation_score(innovation: Float[np.ndarray, " M"], cov: Float[np.ndarray,
 
     None where S is no covariance, or the innovation so many standard deviations off that it is no reading.
     """
-    # LAPACK itself: what numpy and scipy put around it takes longer than a small sample does.
-    from scipy.linalg.lapack import dpotrf, dpotrs, dtrtrs
-
-    root, refused = dpotrf(cov, lower=1)
+    lapack = _lapack()
+    root, refused = lapack.dpotrf(cov, lower=1)
     if refused:
         return None
-    white = dtrtrs(root, innovation, lower=1)[0]
+    white = lapack.dtrtrs(root, innovation, lower=1)[0]
     with np.errstate(over="ignore", invalid="ignore"):  # an absurd reading is caught below
         surprise = float(white @ white)
     log_det = 2 * float(np.log(root.diagonal()).sum())
-    return _score(len(innovation), surprise, log_det, lambda columns: dpotrs(root, columns, lower=1)[0])
+    return _score(len(innovation), surprise, log_det, lambda columns: lapack.dpotrs(root, columns, lower=1)[0])
 
 
 def spread_score(
@@ -64,8 +64,6 @@ def spread_score(
 
     With fewer members than readings, by a system that is as small as the ensemble (matrix inversion lemma).
     """
-    from scipy.linalg.lapack import dpotrf, dpotrs, dtrtrs
-
     if len(innovation) <= len(spread):
         cov = spread.T @ spread
         cov.flat[:: len(innovation) + 1] += noise_var
@@ -74,20 +72,29 @@ def spread_score(
     rows = spread / stds  # Z, S = √R (I + Zᵀ Z) √R
     inner = rows @ rows.T
     inner.flat[:: len(rows) + 1] += 1.0
-    root, refused = dpotrf(inner, lower=1)
+    lapack = _lapack()
+    root, refused = lapack.dpotrf(inner, lower=1)
     if refused:
         return None
     white = innovation / stds
     with np.errstate(over="ignore", invalid="ignore"):  # an absurd reading is caught below
-        explained = dtrtrs(root, rows @ white, lower=1)[0]
-        surprise = float(white @ white - explained @ explained)
+        explained = lapack.dtrtrs(root, rows @ white, lower=1)[0]
+        surprise = max(float(white @ white - explained @ explained), 0.0)
     log_det = 2 * float(np.log(root.diagonal()).sum() + np.log(stds).sum())
 
     def solve(columns: FloatArray) -> FloatArray:
         scaled = (columns.T / stds).T
-        return np.asarray(((scaled - rows.T @ dpotrs(root, rows @ scaled, lower=1)[0]).T / stds).T)
+        return np.asarray(((scaled - rows.T @ lapack.dpotrs(root, rows @ scaled, lower=1)[0]).T / stds).T)
 
     return _score(len(innovation), surprise, log_det, solve)
+
+
+@cache
+def _lapack() -> Any:
+    """LAPACK itself: what numpy and scipy put around it takes longer than a small sample does."""
+    import scipy.linalg.lapack
+
+    return scipy.linalg.lapack
 
 
 def _score(
