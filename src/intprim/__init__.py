@@ -1,8 +1,6 @@
-"""The names of chapter 4 of the dissertation, for scripts written for IntPrim, over `inphase`.
+"""The names of chapter 4 of the dissertation, for scripts written for IntPrim, over `inphase`."""
 
-So far only `intprim.constants` is here; the rest of the chapter follows (see CHANGELOG).
-"""
+from intprim import basis, constants, examples, filter, util
+from intprim.bayesian_interaction_primitives import BayesianInteractionPrimitive
 
-from intprim import constants
-
-__all__ = ["constants"]
+__all__ = ["BayesianInteractionPrimitive", "basis", "constants", "examples", "filter", "util"]

@@ -3,3 +3,5 @@
 import numpy as np
 
 DTYPE = np.float64
+
+DEFAULT_NUM_SAMPLES = 100

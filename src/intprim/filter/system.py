@@ -1,0 +1,149 @@
+"""What all filters of IntPrim share: the model they follow, the samples they take in, the state they tell."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy.typing import ArrayLike
+
+from inphase import Channel, DataError, Model, Noise, OptionError, PhaseModel, Role, Scaling, WeightPrior
+from inphase.basis import Layout, Polynomial
+from inphase.filters import Belief, Filter
+from inphase.observation import Observation
+from inphase.preprocess import Coordinates
+from intprim.basis.basis_model import BasisModel, dofs_of
+from intprim.filter.cyclical import Cyclical
+
+State = tuple[float, Float[np.ndarray, " n"], Float[np.ndarray, "n n"]]
+
+
+class System:
+    """A filter of `inphase` that remembers its belief: phase and derivatives (K), then basis weights (B).
+
+    Its random numbers come from a seed that is drawn where it is made, so `np.random.seed` makes runs repeat; a deep
+    copy draws the same ones as the original.
+    """
+
+    filter: Filter[Any]
+    belief: Belief
+
+    def __init__(self, basis_model: BasisModel, phase: PhaseModel, samples: Float[np.ndarray, "N B"]) -> None:
+        if not isinstance(basis_model, BasisModel):
+            raise OptionError(f"basis_model: expected a model of intprim.basis, got a {type(basis_model).__name__}")
+        self.basis_model, self.time_delta = basis_model, 1.0
+        self.system_size, self.system_order = len(phase.mean), phase.order
+        self.model = _model(basis_model, phase, samples)
+        self._rng = np.random.default_rng(np.random.randint(2**31))  # noqa: NPY002 - scripts call np.random.seed
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> System:
+        other = copy.copy(self)  # models and beliefs never change
+        other._rng = copy.deepcopy(self._rng, memo)
+        return other
+
+    def get_mean(self) -> Float[np.ndarray, " n"]:
+        """(K + B,) the mean of the state."""
+        raise NotImplementedError
+
+    def get_covariance(self) -> Float[np.ndarray, "n n"]:
+        """(K + B, K + B) the covariance of the state."""
+        raise NotImplementedError
+
+    def localize(
+        self,
+        measurement: ArrayLike,
+        measurement_noise: ArrayLike,
+        active_dofs: ArrayLike,
+        return_phase_variance: bool = False,
+    ) -> State:
+        """Take in samples (T, D), one time step after the other, and say phase, mean and covariance of the state.
+
+        measurement_noise: (D, D), diagonal; active_dofs: (M,) those that are seen, the others do not exist, and NaN
+        was not seen. Mean and covariance are those of the weights, (B,), or with `return_phase_variance` (K + B,).
+        Raises DataError, OptionError.
+        """
+        for sample in self._samples(measurement, measurement_noise, active_dofs):
+            self.belief, _ = self.filter.step(self.belief, sample, self.time_delta, self._rng)
+        return self._state(return_phase_variance)
+
+    def _state(self, whole: bool) -> State:
+        own = slice(0 if whole else self.system_size, None)
+        phase = float(self.belief.phase_mean[0])
+        phase = phase % 1.0 if self.model.phase.periodic else min(max(phase, 0.0), 1.0)
+        return phase, self.get_mean()[own], self.get_covariance()[own, own]
+
+    def _samples(self, measurement: ArrayLike, noise: ArrayLike, active_dofs: ArrayLike) -> list[Observation]:
+        count = self.basis_model.num_observed_dof
+        values, noise = np.asarray(measurement, dtype=np.float64), np.asarray(noise, dtype=np.float64)
+        if values.ndim != 2 or values.shape[1] != count:
+            raise DataError(f"measurement: expected (T, D) with D = {count}, got {values.shape}")
+        if noise.shape != (count, count):
+            raise OptionError(f"observation_noise: expected (D, D) = ({count}, {count}), got {noise.shape}")
+        active: Int[np.ndarray, " M"] = np.unique(dofs_of(active_dofs, count, "active_dofs"))
+        own = noise[np.ix_(active, active)]
+        if (own != np.diag(own.diagonal())).any() or not (np.isfinite(own).all() and (own.diagonal() > 0).all()):
+            raise OptionError(
+                "observation_noise: expected a diagonal matrix with variances > 0 of the active DoFs, "
+                f"got {own.tolist()}"
+            )
+        seen = [active[np.isfinite(row[active])] for row in values]
+        return [Observation(at, row[at], noise[at, at]) for at, row in zip(seen, values, strict=True)]
+
+
+def phase_model(
+    mean: ArrayLike, var: ArrayLike, proc_var: float | int, time_delta: float | int, cyclical: bool
+) -> PhaseModel:
+    """The phase prior of 4.2.7.1: mean and variance (K,) of phase, velocity and acceleration, as far as given.
+
+    proc_var: the variance that a time step adds to the highest of them, over time_delta² where that is the velocity.
+    Raises OptionError.
+    """
+    mean, var = np.asarray(mean, dtype=np.float64), np.asarray(var, dtype=np.float64)
+    if mean.ndim != 1 or not 1 <= len(mean) <= 3 or var.shape != mean.shape or not (var >= 0).all():
+        raise OptionError(
+            "initial_phase_mean, initial_phase_var: expected (K,) each, K = 1, 2 or 3, and variances >= 0, "
+            f"got shapes {mean.shape} and {var.shape}, {var.tolist()}"
+        )
+    if not (0 < time_delta < np.inf and 0 <= proc_var < np.inf):
+        raise OptionError(f"expected time_delta > 0 and proc_var >= 0, got {time_delta} and {proc_var}")
+    per_step = proc_var * (time_delta**2 if len(mean) == 2 else 1.0)
+    velocity = float(mean[1]) if len(mean) > 1 and mean[1] > 0 else 1.0  # no filter here reads the nominal one
+    return PhaseModel(mean, np.diag(var), per_step / time_delta, velocity, cyclical)
+
+
+def weights_of(name: str, values: ArrayLike | None, shape: tuple[int | None, ...]) -> Float[np.ndarray, ...]:
+    """Finite numbers of that shape, None for any length; raises OptionError for others, naming the argument."""
+    array = np.asarray(values if values is not None else np.nan, dtype=np.float64)
+    fits = len(shape) == array.ndim and all(s in (None, n) for s, n in zip(shape, array.shape, strict=True))
+    if not fits or not np.isfinite(array).all():
+        wanted = ", ".join("N" if size is None else str(size) for size in shape)
+        raise OptionError(f"{name}: expected finite numbers of shape ({wanted}), got {array.shape}")
+    return array
+
+
+def samples_of(mean: Float[np.ndarray, " B"], cov: Float[np.ndarray, "B B"]) -> Float[np.ndarray, "N B"]:
+    """(2 B, B) weight vectors that have exactly this mean and sample covariance; OptionError where it is none."""
+    value, vector = np.linalg.eigh((cov + cov.T) / 2)
+    if np.abs(cov - cov.T).max() > 1e-8 * np.abs(cov).max() or value[0] < -1e-8 * max(value[-1], 0.0):
+        raise OptionError("cov_basis_weights: expected a covariance, symmetric with no negative variance")
+    rows = np.sqrt(np.maximum(value, 0.0) * (len(value) - 0.5))[:, None] * vector.T
+    return np.concatenate([mean + rows, mean - rows])
+
+
+def _model(basis_model: BasisModel, phase: PhaseModel, samples: Float[np.ndarray, "N B"]) -> Model:
+    """The model of `inphase`: any DoF may be observed, and one beside them, always 0, is controlled by nobody."""
+    names = [f"{i} {name}" for i, name in enumerate(basis_model.observed_dof_names)]
+    channels = (*(Channel(name, Role.OBSERVED) for name in names), Channel("nobody", Role.CONTROLLED))
+    bases, count = (*basis_model.layout.bases, Polynomial(0)), len(channels)
+    return Model(
+        channels=channels,
+        coordinates=Coordinates(channels, np.zeros(count)),
+        scaling=Scaling.none(count),
+        layout=Layout(tuple(Cyclical(basis) for basis in bases) if phase.periodic else bases),
+        prior=WeightPrior(np.pad(samples, ((0, 0), (0, 1)))),
+        noise=Noise(np.ones(count), np.zeros(count)),  # that of the samples is an argument
+        phase=phase,
+        spread=np.ones(count),
+    )
