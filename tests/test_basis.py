@@ -14,11 +14,13 @@ from hypothesis import strategies as st
 from inphase.basis import FAMILIES, Basis, Gaussian, Periodic, Polynomial, Sigmoid, make
 from inphase.errors import OptionError
 
+PLACED = (-0.1, 0.2, 0.25, 0.9, 1.01)
 SIZES = st.integers(3, 25)
 WIDTHS = st.none() | st.floats(0.03, 2.0)
 OPEN = {
-    "gaussian": st.builds(Gaussian, SIZES, WIDTHS),
-    "sigmoid": st.builds(Sigmoid, SIZES, WIDTHS),
+    "gaussian": st.builds(Gaussian, SIZES, WIDTHS)
+    | st.sampled_from([Gaussian(5, w, None, PLACED) for w in (0.1, 1.0)]),
+    "sigmoid": st.builds(Sigmoid, SIZES, WIDTHS) | st.sampled_from([Sigmoid(5, w, PLACED) for w in (None, 1.0)]),
     "polynomial": st.builds(Polynomial, st.integers(0, 20)),
 }
 ANY = st.one_of(*OPEN.values(), st.builds(Periodic, SIZES, WIDTHS))
@@ -159,6 +161,28 @@ def test_intprim_names_the_variance() -> None:
     np.testing.assert_allclose(Gaussian(8, math.sqrt(0.1), margin=0.0)(phases), theirs, rtol=1e-12)
 
 
+@pytest.mark.parametrize(("start", "end"), [(0.0, 1.0), (0.0, 1.01), (0.3, 0.8)])
+def test_functions_stand_where_their_centres_are_placed(start: float, end: float) -> None:
+    phases, centres = np.linspace(0, 1, 50), np.linspace(start, end, 6)
+    off = phases[:, None] - centres
+    at = tuple(centres.tolist())
+    np.testing.assert_allclose(Gaussian(6, 0.3, centres=at)(phases), np.exp(-(off**2) / (2 * 0.09)), rtol=1e-12)
+    np.testing.assert_allclose(Sigmoid(6, 0.1, at)(phases), 1 / (1 + np.exp(-off / 0.1)), rtol=1e-12)
+
+
+@pytest.mark.parametrize("centres", [(0.1, 0.2), (0.1, math.nan, 0.3), [0.1, 0.2, math.inf], ()])
+def test_centres_that_are_not_as_many_phases_are_refused(centres: object) -> None:
+    for kind in (Gaussian, Sigmoid):
+        with pytest.raises(OptionError, match=rf"{kind.__name__} centres: expected 3 finite phases"):
+            kind(3, 0.2, centres=centres)
+
+
+def test_centres_leave_nothing_to_a_margin_and_need_a_width() -> None:
+    for more in ({"margin": 0.0, "width": 0.1}, {}):
+        with pytest.raises(OptionError, match="expected a width and no margin beside them, got width="):
+            Gaussian(3, centres=(0.0, 0.5, 1.0), **more)
+
+
 @given(ANY)
 def test_a_basis_is_made_again_from_its_parameters(basis: Basis) -> None:
     family = next(name for name, kind in FAMILIES.items() if isinstance(basis, kind))
@@ -208,9 +232,9 @@ def test_the_largest_polynomial_is_still_finite() -> None:
 def test_make_names_what_is_wrong() -> None:
     with pytest.raises(OptionError, match="'fourier'; one of gaussian, sigmoid, polynomial, periodic"):
         make("fourier", size=3)
-    with pytest.raises(OptionError, match="arguments are size, width, margin, got size, degree"):
+    with pytest.raises(OptionError, match="arguments are size, width, margin, centres, got size, degree"):
         make("gaussian", size=3, degree=2)
-    with pytest.raises(OptionError, match="'size'; its arguments are size, width, margin, got none"):
+    with pytest.raises(OptionError, match="'size'; its arguments are size, width, margin, centres, got none"):
         make("gaussian")
     with pytest.raises(OptionError, match="arguments are degree, got size"):
         make("polynomial", size=3)

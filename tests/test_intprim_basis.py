@@ -59,8 +59,9 @@ def test_polynomials_span_the_powers_below_the_degree():
 
 
 def test_functions_of_inphase_are_used_as_they_are():
-    assert GaussianModel(8, 0.1, NAMES).basis == Gaussian(8, np.sqrt(0.1), margin=0.0)
-    assert SigmoidalModel(8, 0.1, NAMES).basis == Sigmoid(8, 0.1)
+    centres = tuple(np.linspace(0, 1, 8))
+    assert GaussianModel(8, 0.1, NAMES).basis == Gaussian(8, np.sqrt(0.1), centres=centres)
+    assert SigmoidalModel(8, 0.1, NAMES).basis == Sigmoid(8, 0.1, centres)
     for model in MODELS.values():
         assert all(isinstance(basis, Basis) for basis in model.layout.bases)
 
@@ -288,31 +289,38 @@ def mistakes():
     empty, full = Selection(NAMES), selection_of([np.zeros((2, 9))])
     yield lambda: GaussianModel(8, 0.0, NAMES), r"scale: expected a positive number, got 0\.0"
     yield lambda: SigmoidalModel(8, -0.1, NAMES), r"scale: expected a positive number, got -0\.1"
-    yield lambda: GaussianModel(1, 0.1, NAMES), r"size: expected a whole number from 2 to 1000, got 1"
+    yield lambda: GaussianModel(1, 0.1, NAMES), r"degree: expected a whole number from 2, got 1"
     yield lambda: PolynomialModel(0, NAMES), r"degree: expected a whole number from 1, got 0"
     yield lambda: GaussianModel(8, 0.1, []), r"observed_dof_names: expected a name for every DoF"
     yield lambda: GaussianModel(8, 0.1, "XY"), r"observed_dof_names: expected a name for every DoF, got 'XY'"
     yield lambda: GaussianModel(8, 0.1, NAMES, 0.5, 0.5), r"expected start_phase < end_phase, got 0\.5 and 0\.5"
-    yield lambda: MixtureModel([]), r"basis_models: expected at least one"
+    yield lambda: MixtureModel([]), r"basis_models: expected Gaussian-, .* got none"
     yield lambda: MixtureModel([MODELS["mixture"]]), r"basis_models: expected .* got a MixtureModel"
     fit = model.fit_basis_functions_linear_closed_form
-    yield lambda: fit(PHASES, np.zeros((2, 101))), r"y: expected \(T, D\) = \(101, 2\), got \(2, 101\)"
+    yield lambda: fit(PHASES, np.zeros((2, 101))), r"y: expected \(T, D\) with T = 101, D = 2, got \(2, 101\)"
     yield lambda: fit(PHASES, np.full((101, 2), np.nan)), r"y: expected finite values"
-    yield lambda: fit([[0.1]], np.zeros((1, 2))), r"x: expected \(T,\) phases, all finite, got shape \(1, 1\)"
-    yield lambda: model.apply_coefficients(0.1, np.zeros(8)), r"coefficients: expected 16 weights, got \(8,\)"
+    yield lambda: fit([[0.1]], np.zeros((1, 2))), r"x: expected \(T,\), got \(1, 1\)"
+    yield lambda: model.apply_coefficients(0.1, np.zeros(8)), r"coefficients: expected \(B,\) with B = 16, got \(8,\)"
     yield lambda: model.apply_coefficients(np.nan, np.zeros(16)), r"x: expected a phase or \(T,\) phases, all finite"
     yield lambda: model.observed_to_state_indices([2]), r"observed_indices: .* from 0 to 1, got \[2\]"
     yield lambda: model.observed_to_state_indices(["X"]), r"observed_indices: .* from 0 to 1, got \['X'\]"
-    yield lambda: model.convert_old_weights(np.zeros((3, 8))), r"weights: expected \(N, 16\), got \(3, 8\)"
-    yield lambda: model.plot_weighted(np.zeros(16), NAMES), r"expected \(D, degree\) = \(2, 8\), got \(16,\)"
+    yield lambda: model.convert_old_weights(np.zeros((3, 8))), r"weights: expected \(N, B\) with B = 16, got \(3, 8\)"
+    yield (
+        lambda: model.plot_weighted(np.zeros(16), NAMES),
+        r"expected \(D, degree\) with D = 2, degree = 8, got \(16,\)",
+    )
     yield lambda: Selection(NAMES, scaling_groups=[[0, 2]]), r"scaling_groups: .* from 0 to 1, got \[0, 2\]"
     yield lambda: Selection(NAMES, scaling_groups=[[0], [0, 1]]), r"scaling_groups: expected every DoF in one group"
-    yield lambda: empty.add_demonstration(np.zeros((9, 2))), r"data: expected \(D, T\) = \(2, T > 1\), got \(9, 2\)"
+    yield lambda: empty.add_demonstration(np.zeros((9, 2))), r"data: expected \(D, T\) with D = 2, got \(9, 2\)"
+    yield (
+        lambda: empty.add_demonstration([[1, 2], [3]]),
+        r"data: expected numbers \(D, T\) with D = 2, got \[\[1, 2\], \[3\]\]",
+    )
     yield lambda: empty.add_demonstration(np.full((2, 9), np.inf)), r"data: expected finite values"
     yield lambda: empty.get_model_mse(model, [0, 1]), r"expected demonstrations, got none"
     yield lambda: empty.get_best_model([1.0], [1.0]), r"expected what get_information_criteria returned"
     yield lambda: full.get_model_mse(model, [0, 3]), r"dofs: .* from 0 to 1, got \[0, 3\]"
-    yield lambda: full.get_model_mse(model, [0]), r"y: expected \(T, D\) = \(9, 2\), got \(9, 1\)"
+    yield lambda: full.get_model_mse(model, [0]), r"y: expected \(T, D\) with T = 9, D = 2, got \(9, 1\)"
     yield lambda: full.get_model_mse(model, [0, 1], 0.51, 0.52), r"samples between phase 0\.51 and 0\.52, got none"
 
 

@@ -6,12 +6,11 @@ from __future__ import annotations
 import copy
 import pickle
 import re
-import sys
-import types
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from sklearn.preprocessing import MinMaxScaler
 
 import intprim
 from inphase import ModelFileError, OptionError
@@ -367,23 +366,23 @@ def test_a_file_gives_the_same_primitive(primitive, demonstrations, tmp_path):
         again.import_data(tmp_path / "absent.bip")
 
 
-def test_a_file_of_the_old_library_gives_the_same_primitive(primitive, demonstrations, tmp_path, monkeypatch):
-    """Written as the old library did, by a stand-in for the scaler that it used."""
-    module = types.ModuleType("sklearn.preprocessing._data")
-    module.MinMaxScaler = type("MinMaxScaler", (), {"__module__": module.__name__})
-    for name in ("sklearn", "sklearn.preprocessing", module.__name__):
-        monkeypatch.setitem(sys.modules, name, module)
-    everything = np.concatenate(demonstrations, axis=1)
-    scaler, scale = module.MinMaxScaler(), 1 / np.ptp(everything)
-    scaler.scale_, scaler.min_ = np.array([scale]), np.array([-everything.min() * scale])
+def test_a_file_of_the_old_library_moves_as_it_did(primitive, demonstrations, tmp_path):
+    """Written as the old library did, whose last centre was 1.01 where none was named."""
+    everything, phases = np.concatenate(demonstrations, axis=1), np.linspace(0, 1, 100)
+    scaler = MinMaxScaler().partial_fit(everything.reshape(-1, 1))
+    functions = np.exp(-((phases[:, None] - np.linspace(0, 1.01, SIZE)) ** 2) / (2 * 0.02))
+    x, y = np.random.default_rng(0).normal(size=(2, SIZE, 3))
     for groups, scalers in ((GROUPS, [scaler]), (None, [])):
-        content = {"basis_weights": primitive.basis_weights, "scaling_groups": groups, "scalers": scalers}
+        weights = np.concatenate([x, y]).T
+        content = {"basis_weights": weights, "scaling_groups": groups, "scalers": scalers}
         (tmp_path / "old.bip").write_bytes(pickle.dumps(content))
-        again = untrained(primitive)
-        again.import_data(tmp_path / "old.bip")
-        expected = primitive.get_mean_trajectory()
-        expected = expected if groups else (expected - everything.min()) * scale
-        np.testing.assert_allclose(again.get_mean_trajectory(), expected, rtol=1e-9)
+        expected = np.stack([functions @ x.mean(1), functions @ y.mean(1)])
+        moved = expected if groups is None else scaler.inverse_transform(expected.T).T
+        for end_phase, close in ((1.01, 1e-9), (None, 1e-2)):
+            model = intprim.basis.GaussianModel(SIZE, 0.02, NAMES, end_phase=end_phase)
+            again = intprim.BayesianInteractionPrimitive(model)
+            again.import_data(tmp_path / "old.bip")
+            np.testing.assert_allclose(again.get_mean_trajectory(), moved, rtol=0, atol=close * np.ptp(moved))
 
 
 # -------------------------------------------------------------------------------------------------------- bad input
@@ -398,7 +397,10 @@ def test_a_file_of_the_old_library_gives_the_same_primitive(primitive, demonstra
         (lambda p, d: p.compute_standardization(d[0]), "before the first is added"),
         (lambda p, d: p.generate_probable_trajectory_recursive(d[0], np.eye(2), Y_ONLY), "call set_filter first"),
         (lambda p, d: run(p, d[0][:1], np.eye(2), Y_ONLY), r"trajectory: expected .* D = 2, got \(1, "),
-        (lambda p, d: run(p, d[0], np.eye(3), Y_ONLY), r"observation_noise: expected \(D, D\) = \(2, 2\)"),
+        (
+            lambda p, d: run(p, d[0], np.eye(3), Y_ONLY),
+            r"observation_noise: expected \(D, D\) with D = 2, got \(3, 3\)",
+        ),
         (lambda p, d: run(p, d[0], np.ones((2, 2)), [0, 1]), "observation_noise: expected a diagonal"),
         (lambda p, d: run(p, d[0], np.zeros((2, 2)), Y_ONLY), "observation_noise: .* variances > 0"),
         (lambda p, d: run(p, d[0], np.eye(2), [2]), "active_dofs: expected indices of DoFs from 0 to 1"),
@@ -409,14 +411,20 @@ def test_a_file_of_the_old_library_gives_the_same_primitive(primitive, demonstra
         (lambda p, d: p.set_filter(other_basis()), "filter: expected one of the primitive's basis model"),
         (
             lambda p, d: EnsembleKalmanFilter(p.basis_model, [0], [1], 0, np.ones((5, 3))),
-            r"ensemble: .*\(N, 12",
+            r"initial_ensemble: expected \(E, B\) with B = 12, got \(5, 3\)",
         ),
         (lambda p, d: EnsembleKalmanFilter(p.basis_model, [0, 1], [1], 0, p.basis_weights), "initial_phase_var"),
         (lambda p, d: EnsembleKalmanFilter(p.basis_model, [0], [1], -1, p.basis_weights), "proc_var >= 0"),
         (lambda p, d: EnsembleKalmanFilter(p.basis_model, [0], [1], 0, p.basis_weights[:1]), "at least 2 demonstr"),
-        (lambda p, d: KalmanFilter(p.basis_model, np.ones(12), None), "cov_basis_weights: expected finite numbers"),
+        (
+            lambda p, d: KalmanFilter(p.basis_model, np.ones(12), None),
+            r"cov_basis_weights: expected \(B, B\) with B = 12, got None",
+        ),
         (lambda p, d: KalmanFilter(p.basis_model, np.ones(12), -np.eye(12)), "cov_basis_weights: expected a covar"),
-        (lambda p, d: fastdtw(np.ones((3, 2)), np.ones((3, 1))), r"got \(3, 2\) and \(3, 1\)"),
+        (
+            lambda p, d: fastdtw(np.ones((3, 2)), np.ones((3, 1))),
+            r"observed_trajectory: expected \(T, M\) with M = 1, got \(3, 2\)",
+        ),
         (lambda p, d: intprim.examples.get_phase_stats([]), "training_trajectories: expected at least one"),
         (lambda p, d: intprim.examples.create_2d_handwriting_data(1, 0, -1, 0, 9, 1), "standard deviations >= 0"),
         (lambda p, d: untrained(p).get_mean_trajectory(), "at least 1 demonstrations added, got 0"),

@@ -209,6 +209,19 @@ def test_what_is_no_prior_is_refused(rows: np.ndarray, options: dict[str, Any]) 
         WeightPrior(rows, **options)
 
 
+@pytest.mark.parametrize("rank", [1, 3, 5])
+def test_a_prior_of_moments_has_just_these(rank: int, rng: np.random.Generator) -> None:
+    mean, root = rng.normal(size=5), rng.normal(size=(rank, 5))
+    prior = WeightPrior.from_moments(mean, root.T @ root)
+    np.testing.assert_allclose(prior.mean, mean, atol=1e-12)
+    np.testing.assert_allclose(prior.cov, root.T @ root, atol=1e-12)
+    assert len(prior.factor) == rank
+    with pytest.raises(OptionError, match="expected a covariance of the weights"):
+        WeightPrior.from_moments(mean, root.T @ root - 2 * np.diag(mean**2 + 1))
+    with pytest.raises(OptionError, match="expected a covariance of the weights"):
+        WeightPrior.from_moments(mean, root.T @ root + np.triu(np.ones((5, 5)), 1))
+
+
 def test_a_prior_is_read_only_and_its_own() -> None:
     rows = samples(4, 3, 0)
     prior, mean = WeightPrior(rows), rows.mean(0)

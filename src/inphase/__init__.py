@@ -13,9 +13,10 @@ from inphase.errors import (
 from inphase.io import load
 from inphase.model import Model
 from inphase.noise import Noise
+from inphase.observation import Observation
 from inphase.phase import PhaseModel
-from inphase.preprocess import trim
-from inphase.preprocess.scaling import Scaling
+from inphase.preprocess import Coordinates, Scaling, trim
+from inphase.recording import Recording
 from inphase.result import Estimate, Response, Status
 from inphase.session import Session
 from inphase.training import fit, learn_phase
@@ -27,6 +28,7 @@ __version__ = "0.1.0"
 __all__ = [
     "Channel",
     "ChannelError",
+    "Coordinates",
     "DataError",
     "Dataset",
     "Demonstration",
@@ -36,9 +38,11 @@ __all__ = [
     "Model",
     "ModelFileError",
     "Noise",
+    "Observation",
     "ObservationError",
     "OptionError",
     "PhaseModel",
+    "Recording",
     "Response",
     "Role",
     "Scaling",

@@ -44,6 +44,19 @@ class WeightPrior:
         check_blocks(self.blocks, self.samples.shape[1])
         object.__setattr__(self, "blocks", tuple(int(count) for count in self.blocks))
 
+    @classmethod
+    def from_moments(cls, mean: Float[np.ndarray, " B"], cov: Float[np.ndarray, "B B"]) -> WeightPrior:
+        """The prior of a Gaussian with mean (B,) and covariance (B, B): 2 B samples that have just these moments.
+
+        Raises OptionError where the covariance is none.
+        """
+        value, vector = np.linalg.eigh((cov + cov.T) / 2)
+        if np.abs(cov - cov.T).max() > 1e-8 * np.abs(cov).max() or value[0] < -1e-8 * max(value[-1], 0.0):
+            raise OptionError("expected a covariance of the weights, symmetric with no negative variance")
+        value[value < 1e-12 * value[-1]] = 0.0  # rounding, whose root would count as a direction
+        rows = np.sqrt(value * (len(value) - 0.5))[:, None] * vector.T
+        return cls(np.concatenate([mean + rows, mean - rows]))
+
     @cached_property
     def mean(self) -> Float[np.ndarray, " B"]:
         """(B,) w₀, the mean of the demonstrations (Eq. 2.11)."""

@@ -13,11 +13,12 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from inphase import DataError, ModelFileError, OptionError
+from inphase import DataError, ModelFileError, OptionError, Scaling
+from inphase.io import read_bip, whole_file
 from intprim.basis.basis_model import BasisModel
 from intprim.basis.selection import group_scaling
+from intprim.checks import numbers
 from intprim.constants import DEFAULT_NUM_SAMPLES
-from intprim.legacy import read_bip
 
 
 class BayesianInteractionPrimitive:
@@ -33,21 +34,19 @@ class BayesianInteractionPrimitive:
         self.filter: Any = None
         self.basis_weights = np.empty((0, basis_model.layout.size))
         self._range = np.empty((basis_model.num_observed_dof, 0))  # the lowest and the highest value, once known
-        self.scaling = group_scaling(scaling_groups, [self._range])
+        self.scaling = group_scaling(scaling_groups, self._range)
 
     def compute_standardization(self, trajectory: ArrayLike) -> None:
         """Widen the scaling by a demonstration (D, T); all of them, before the first is added (4.2.5).
 
         Raises OptionError after that, DataError and TypeError for what is no such matrix.
         """
-        values = self._trajectory(trajectory)
-        if not self.scaling_groups:
-            return
-        if len(self.basis_weights):
-            raise OptionError("expected compute_standardization for all demonstrations before the first is added")
-        seen = np.concatenate([self._range, values], axis=1)
-        self._range = np.stack([seen.min(1), seen.max(1)], axis=1)
-        self.scaling = group_scaling(self.scaling_groups, [self._range])
+        seen = np.concatenate([self._range, self._trajectory(trajectory)], axis=1)
+        if self.scaling_groups:
+            if len(self.basis_weights):
+                raise OptionError("expected compute_standardization for all demonstrations before the first is added")
+            self._range = np.stack([seen.min(1), seen.max(1)], axis=1)
+            self.scaling = group_scaling(self.scaling_groups, self._range)
 
     def add_demonstration(self, trajectory: ArrayLike) -> None:
         """Learn the weights of a demonstration (D, T). Raises as `compute_standardization`, and without a scaling."""
@@ -55,16 +54,15 @@ class BayesianInteractionPrimitive:
 
     def basis_transform(self, trajectory: ArrayLike) -> Float[np.ndarray, " B"]:
         """(B,) the weights of a trajectory (D, T)."""
-        values = self._trajectory(trajectory)
-        scaled = self._known_scaling().scale(values.T)
+        scaled = self._known_scaling().scale(self._trajectory(trajectory).T)
         return self.basis_model.fit_basis_functions_linear_closed_form(np.linspace(0.0, 1.0, len(scaled)), scaled)
 
     def basis_inverse_transform(
         self, x: ArrayLike, weights: ArrayLike, deriv: bool = False
     ) -> Float[np.ndarray, "D T"]:
         """(D, T) the trajectory of weights (B,) at phases x (T,), in the units of the DoFs; `deriv`: its slopes."""
-        phases, scaling = np.atleast_1d(np.asarray(x, dtype=np.float64)), self._known_scaling()
-        read = self.basis_model.apply_coefficients(phases, weights, deriv).T
+        scaling = self._known_scaling()
+        read = self.basis_model.apply_coefficients(np.atleast_1d(np.asarray(x)), weights, deriv).T
         return np.asarray((read * scaling.span if deriv else scaling.unscale(read)).T)
 
     def get_basis_weight_parameters(self) -> tuple[Float[np.ndarray, " B"], Float[np.ndarray, "B B"] | None]:
@@ -74,13 +72,13 @@ class BayesianInteractionPrimitive:
 
     def get_mean_trajectory(self, num_samples: SupportsFloat = DEFAULT_NUM_SAMPLES) -> Float[np.ndarray, "D T"]:
         """(D, num_samples) the trajectory of the mean weights."""
-        return self.basis_inverse_transform(_domain(0.0, num_samples), self._demonstrated(1).mean(0))
+        return self.basis_inverse_transform(_domain(num_samples), self._demonstrated(1).mean(0))
 
     def get_approximate_trajectory(
         self, trajectory: ArrayLike, num_samples: SupportsFloat = DEFAULT_NUM_SAMPLES, deriv: bool = False
     ) -> Float[np.ndarray, "D T"]:
         """(D, num_samples) what the basis makes of a trajectory (D, T); `deriv`: its slopes over the phase."""
-        return self.basis_inverse_transform(_domain(0.0, num_samples), self.basis_transform(trajectory), deriv)
+        return self.basis_inverse_transform(_domain(num_samples), self.basis_transform(trajectory), deriv)
 
     def get_approximate_trajectory_derivative(
         self, trajectory: ArrayLike, num_samples: SupportsFloat = DEFAULT_NUM_SAMPLES
@@ -92,7 +90,7 @@ class BayesianInteractionPrimitive:
         self, num_samples: SupportsFloat = DEFAULT_NUM_SAMPLES
     ) -> tuple[Float[np.ndarray, "D T"], Float[np.ndarray, "D T"], Float[np.ndarray, "D T"]]:
         """(D, num_samples) the demonstrations' mean, and a standard deviation above and below. DataError below two."""
-        domain = _domain(0.0, num_samples)
+        domain = _domain(num_samples)
         curves = np.stack([self.basis_inverse_transform(domain, weights) for weights in self._demonstrated(2)])
         mean, std = curves.mean(0), curves.std(0, ddof=1)
         return mean, mean + std, mean - std
@@ -102,15 +100,13 @@ class BayesianInteractionPrimitive:
 
         Raises OptionError for a filter of another basis, or what is no filter.
         """
-        theirs = getattr(filter, "basis_model", self.basis_model)
         if not hasattr(filter, "localize"):
             raise OptionError(f"filter: expected one of intprim.filter, got a {type(filter).__name__}")
-        if theirs.layout != self.basis_model.layout:
-            ours, other = (
-                [(basis.parameters(), type(basis).__name__) for basis in model.layout.bases]
-                for model in (self.basis_model, theirs)
-            )
-            raise OptionError(f"filter: expected one of the primitive's basis model, {ours}, got one of {other}")
+        ours, theirs = self.basis_model.layout, getattr(filter, "basis_model", self.basis_model).layout
+        if theirs != ours:
+            wanted, got = ([f"{type(b).__name__}({b.size})" for b in layout.bases] for layout in (ours, theirs))
+            same = ", but with other widths or centres" if wanted == got else ""
+            raise OptionError(f"filter: expected one of the primitive's basis model {wanted}, got one of {got}{same}")
         self.filter = filter
 
     def generate_probable_trajectory_recursive(
@@ -136,7 +132,7 @@ class BayesianInteractionPrimitive:
             if value is not None and not 0 <= value <= 1:
                 raise OptionError(f"{name}: expected a phase between 0 and 1, got {value}")
         scaled = self._known_scaling().scale(self._trajectory(trajectory, live=True).T)
-        domain = _domain(0.0, num_samples)
+        domain = _domain(num_samples)
         phase, mean, cov = self.filter.localize(scaled, observation_noise, active_dofs, return_variance)
         start = min(phase + phase_lookahead, 1.0) if starting_phase is None else starting_phase
         weights = mean[-self.basis_model.layout.size :]
@@ -145,10 +141,8 @@ class BayesianInteractionPrimitive:
     def export_data(self, file_name: str | PathLike[str]) -> None:
         """Write weights and scaling to a file, whole or not at all: a .npz whatever its name, no pickle (4.2.6.1)."""
         groups = None if self.scaling_groups is None else [[int(dof) for dof in g] for g in self.scaling_groups]
-        part = Path(f"{file_name}.part")
-        with part.open("wb") as file:
+        with whole_file(file_name) as part, part.open("wb") as file:
             np.savez(file, basis_weights=self.basis_weights, range=self._range, scaling_groups=json.dumps(groups))
-        part.replace(file_name)
 
     def import_data(self, file_name: str | PathLike[str]) -> None:
         """Read such a file, or a .bip of the old library (4.2.6.2).
@@ -156,30 +150,27 @@ class BayesianInteractionPrimitive:
         Raises ModelFileError for any other, and for one of another basis or other DoFs.
         """
         dofs, size = self.basis_model.num_observed_dof, self.basis_model.layout.size
-        weights, ends, groups = _read(file_name, dofs)
+        weights, ends, groups, old = _read(file_name, dofs)
         if weights.ndim != 2 or weights.shape[1] != size or len(ends) != dofs or not np.isfinite(weights).all():
             raise ModelFileError(
                 f"{file_name}: expected {dofs} DoFs with weights (N, {size}), got {len(ends)} and {weights.shape}"
             )
         try:
-            scaling = group_scaling(groups, [ends])
+            scaling = group_scaling(groups, ends)
         except (ValueError, IndexError, TypeError) as error:
             raise ModelFileError(f"{file_name}: {error}") from None
-        self.basis_weights, self._range, self.scaling_groups, self.scaling = weights, ends, groups, scaling
+        self.basis_weights = self.basis_model.convert_old_weights(weights) if old else weights
+        self._range, self.scaling_groups, self.scaling = ends, groups, scaling
 
     def _trajectory(self, trajectory: ArrayLike, live: bool = False) -> Float[np.ndarray, "D T"]:
         if not isinstance(trajectory, np.ndarray):
             raise TypeError(f"trajectory: expected a numpy array (D, T), got a {type(trajectory).__name__}")
-        count = self.basis_model.num_observed_dof
-        if trajectory.ndim != 2 or len(trajectory) != count or (trajectory.shape[1] < 2 and not live):
-            least = "" if live else " of at least 2 samples"
-            raise DataError(f"trajectory: expected (D, T) with D = {count}{least}, got {trajectory.shape}")
-        values = trajectory.astype(np.float64)
-        if not live and not np.isfinite(values).all():
-            raise DataError("trajectory: expected finite values, got NaN or infinity")
+        values = numbers("trajectory", trajectory, "D T", finite=not live, D=self.basis_model.num_observed_dof)
+        if values.shape[1] < 2 and not live:
+            raise DataError(f"trajectory: expected (D, T) of at least 2 samples, got {values.shape}")
         return values
 
-    def _known_scaling(self) -> Any:
+    def _known_scaling(self) -> Scaling:
         if self.scaling_groups and not self._range.shape[1]:
             raise OptionError("scaling_groups: expected compute_standardization with all demonstrations first")
         return self.scaling
@@ -190,23 +181,22 @@ class BayesianInteractionPrimitive:
         return self.basis_weights
 
 
-def _domain(start: float | int, num_samples: SupportsFloat) -> Float[np.ndarray, " T"]:
+def _domain(num_samples: SupportsFloat) -> Float[np.ndarray, " T"]:
     count = int(float(num_samples))  # the tutorial divides, and counts on what Python 2 made of that
     if count < 1:
         raise OptionError(f"num_samples: expected at least 1, got {num_samples}")
-    return np.linspace(start, 1.0, count)
+    return np.linspace(0.0, 1.0, count)
 
 
 def _read(
     path: str | PathLike[str], dofs: int
-) -> tuple[Float[np.ndarray, ...], Float[np.ndarray, "D _"], list[list[int]] | None]:
-    """Weights, the range of every DoF and the scaling groups in a file of ours or an old one."""
+) -> tuple[Float[np.ndarray, ...], Float[np.ndarray, "D _"], list[list[int]] | None, bool]:
+    """Weights, the range of every DoF, the scaling groups, and whether it is a file of the old library."""
     try:
         content = Path(path).read_bytes()
         if content[:2] == b"PK":
             with np.load(BytesIO(content), allow_pickle=False) as file:
-                groups = json.loads(str(file["scaling_groups"]))
-                return file["basis_weights"], file["range"], groups
+                return file["basis_weights"], file["range"], json.loads(str(file["scaling_groups"])), False
     except OSError as error:
         raise ModelFileError(f"{path}: cannot be read: {error.strerror or error}") from None
     except Exception as error:  # noqa: BLE001 - a damaged file may break any step
@@ -214,8 +204,7 @@ def _read(
     old = read_bip(path)
     ends = np.zeros((dofs, 2 if old.scaling_groups else 0))
     for group, low, high in zip(old.scaling_groups or (), old.low, old.high, strict=True):
-        for dof in group:
-            if dof >= dofs:
-                raise ModelFileError(f"{path}: expected scaling groups of {dofs} DoFs, got DoF {dof}")
-            ends[dof] = low, high
-    return old.basis_weights, ends, None if old.scaling_groups is None else [list(g) for g in old.scaling_groups]
+        if max(group) >= dofs:
+            raise ModelFileError(f"{path}: expected scaling groups of {dofs} DoFs, got DoF {max(group)}")
+        ends[list(group)] = low, high
+    return old.basis_weights, ends, None if old.scaling_groups is None else [list(g) for g in old.scaling_groups], True

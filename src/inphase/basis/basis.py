@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import fields
 from numbers import Integral, Real
 from typing import Any, Protocol, runtime_checkable
@@ -39,8 +41,8 @@ class Basis(Protocol):
     ) -> tuple[Float[np.ndarray, "*P B"], Float[np.ndarray, "*P B"]]:
         """(*P, B) the values and (*P, B) the slopes dΦ/dφ, one-sided at exactly 0 and 1."""
 
-    def parameters(self) -> dict[str, float | int]:
-        """The arguments that make an equal basis."""
+    def parameters(self) -> dict[str, Any]:
+        """The arguments that make an equal basis: numbers, or tuples of them."""
 
 
 def clipped(phases: Float[np.ndarray, "*P"]) -> Float[np.ndarray, "*P 1"]:
@@ -54,9 +56,12 @@ def clipped_and_inside(phases: Float[np.ndarray, "*P"]) -> tuple[Float[np.ndarra
     return within, within == phases[..., None]
 
 
-def spread(size: int) -> Float[np.ndarray, " B"]:
-    """(size,) centres, uniform on [0, 1], both ends included."""
-    return np.linspace(0.0, 1.0, size)
+def placed(name: str, centres: Sequence[Any], size: int) -> tuple[float, ...]:
+    """`centres` as `size` phases, not all of them in [0, 1] perhaps; raises OptionError for anything else."""
+    values = tuple(float(c) if isinstance(c, Real) else math.nan for c in centres)
+    if len(values) != size or not all(math.isfinite(c) for c in values):
+        raise OptionError(f"{name}: expected {size} finite phases, one a function, got {centres!r}")
+    return values
 
 
 def whole(name: str, value: object, least: int, most: int = MOST) -> int:
@@ -82,5 +87,6 @@ def settle(owner: Any, **values: Any) -> None:
 
 
 def arguments(basis: Any) -> dict[str, Any]:
-    """The constructor arguments of a family's dataclass, as they are now."""
-    return {field.name: getattr(basis, field.name) for field in fields(basis) if field.init}
+    """The constructor arguments of a family's dataclass, as they are now, less those that are left open."""
+    values = {field.name: getattr(basis, field.name) for field in fields(basis) if field.init}
+    return {name: value for name, value in values.items() if value is not None}

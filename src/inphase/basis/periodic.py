@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -48,5 +48,5 @@ class Periodic:
         values = np.exp(-2 * self._sharpness * sine * sine)
         return values, values * sine * np.cos(half_angle) * (-4 * np.pi * self._sharpness)
 
-    def parameters(self) -> dict[str, float | int]:
+    def parameters(self) -> dict[str, Any]:
         return arguments(self)

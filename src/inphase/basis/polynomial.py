@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -50,7 +50,7 @@ class Polynomial:
         slopes[..., :-1] -= lower
         return bernstein(within, self._binomials), slopes
 
-    def parameters(self) -> dict[str, float | int]:
+    def parameters(self) -> dict[str, Any]:
         return arguments(self)
 
 

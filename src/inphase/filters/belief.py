@@ -90,10 +90,17 @@ class GaussianBelief:
         return frozen(prior.mean + self.mean[self._size :] @ prior.factor)
 
     @property
+    def state_moments(self) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n n"]]:
+        """(K + B,) mean and (K + B, K + B) covariance of the state [φ, φ̇, …, w]."""
+        factor, size = self.model.prior.factor, self._size
+        back = np.zeros((len(self.mean), size + factor.shape[1]))
+        back[:size, :size], back[size:, size:] = np.eye(size), factor
+        return np.concatenate([self.phase_mean, self.weights_mean]), back.T @ self.cov @ back
+
+    @property
     def weights_cov(self) -> Float[np.ndarray, "B B"]:
         """(B, B) the covariance of the basis weights."""
-        factor = self.model.prior.factor
-        return np.asarray(factor.T @ self.cov[self._size :, self._size :] @ factor)
+        return self.state_moments[1][self._size :, self._size :]
 
     def trajectory(
         self, course: Course, features: Int[np.ndarray, " M"]
@@ -131,6 +138,11 @@ class EnsembleBelief:
         if self.roots is None:
             return self.carried
         return frozen(np.concatenate([self.carried[:, : -len(self.roots)], self._mixed], axis=1))
+
+    @property
+    def state_moments(self) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n n"]]:
+        """(K + B,) mean and (K + B, K + B) covariance of the state [φ, φ̇, …, w]."""
+        return self.members.mean(0), np.cov(self.members, rowvar=False)
 
     @cached_property
     def phase_mean(self) -> Float[np.ndarray, " K"]:

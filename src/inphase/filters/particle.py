@@ -44,6 +44,12 @@ class WeightedBelief:
         """(P, K + B) the states [φ, φ̇, …, w]."""
         return frozen(np.concatenate([self.moving, self.drawn[self.origin]], axis=1))
 
+    @property
+    def state_moments(self) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n n"]]:
+        """(K + B,) mean and (K + B, K + B) covariance of the state [φ, φ̇, …, w]."""
+        states = np.concatenate([self._moving, self.drawn[self.origin]], axis=1)
+        return self.weights @ states, np.cov(states, rowvar=False, ddof=0, aweights=self.weights)
+
     @cached_property
     def weights(self) -> Float[np.ndarray, " P"]:
         """(P,) the probability of each particle."""

@@ -1,7 +1,27 @@
-"""Files in, values out: recordings as CSV and npz (`load`), and model files; nothing else in the core opens a file."""
+"""Files in, values out: recordings as CSV and npz (`load`), model files, and files of IntPrim.
 
+Nothing else in the core opens a file.
+"""
+
+from inphase.io.atomic import whole_file
 from inphase.io.files import find_episodes
+from inphase.io.intprim_analysis import read_analysis
+from inphase.io.intprim_analysis_writer import AnalysisHead, AnalysisStep, write_analysis
+from inphase.io.intprim_model import OldModel, read_bip
 from inphase.io.load import load, pick_roles, read_episode
 from inphase.io.table import Table
 
-__all__ = ["Table", "find_episodes", "load", "pick_roles", "read_episode"]
+__all__ = [
+    "AnalysisHead",
+    "AnalysisStep",
+    "OldModel",
+    "Table",
+    "find_episodes",
+    "load",
+    "pick_roles",
+    "read_analysis",
+    "read_bip",
+    "read_episode",
+    "whole_file",
+    "write_analysis",
+]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -31,5 +31,5 @@ class Cyclical:
     ) -> tuple[Float[np.ndarray, "*P B"], Float[np.ndarray, "*P B"]]:
         return self.basis.with_derivative(np.asarray(phases % 1.0))
 
-    def parameters(self) -> dict[str, float | int]:
+    def parameters(self) -> dict[str, Any]:
         return self.basis.parameters()

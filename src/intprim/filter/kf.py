@@ -10,14 +10,13 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from inphase import OptionError, PhaseModel
-from inphase.filters import Bip
-from intprim.basis.basis_model import BasisModel, dofs_of
+from intprim.basis.basis_model import BasisModel
+from intprim.checks import dofs_of
 from intprim.filter.align import dtw
-from intprim.filter.spatiotemporal.ekf import GaussianSystem
-from intprim.filter.system import State, samples_of, weights_of
+from intprim.filter.system import State, System, gaussian_prior
 
 
-class KalmanFilter(GaussianSystem):
+class KalmanFilter(System):
     """`inphase.filters.Bip` with a phase that is told to it.
 
     align_func: observed (T, M) and predicted (N, M) of the active DoFs -> the index in the latter that the former has
@@ -34,18 +33,13 @@ class KalmanFilter(GaussianSystem):
         iterative_alignment: bool = False,
         num_align_samples: int = 100,
     ) -> None:
-        size = basis_model.layout.size
-        mean = weights_of("mean_basis_weights", mean_basis_weights, (size,))
-        cov = weights_of("cov_basis_weights", cov_basis_weights, (size, size))
         if num_align_samples < 2:
             raise OptionError(f"num_align_samples: expected at least 2, got {num_align_samples}")
         told = PhaseModel(np.zeros(1), np.zeros((1, 1)), diffusion=0.0, nominal_velocity=1.0)
-        super().__init__(basis_model, told, samples_of(mean, cov))
+        super().__init__(basis_model, told, gaussian_prior(basis_model, mean_basis_weights, cov_basis_weights), "bip")
         self.align_func, self.iterative_alignment = align_func, iterative_alignment
         self.num_align_samples, self.last_phase_estimate = num_align_samples, 0.0
         self.previous_observations = np.empty((0, basis_model.num_observed_dof))
-        self.filter = Bip(self.model)
-        self.belief = self.filter.init(self._rng)
 
     def localize(
         self,
@@ -60,9 +54,8 @@ class KalmanFilter(GaussianSystem):
         """
         samples = self._samples(measurement, measurement_noise, active_dofs)
         begun, self.last_phase_estimate = self.last_phase_estimate, self._aligned(measurement, active_dofs)
-        for sample, phase in zip(
-            samples, np.linspace(begun, self.last_phase_estimate, len(samples) + 1)[1:], strict=True
-        ):
+        phases = np.linspace(begun, self.last_phase_estimate, len(samples) + 1)[1:]
+        for sample, phase in zip(samples, phases, strict=True):
             mean = np.concatenate([[phase], self.belief.mean[1:]])
             self.belief, _ = self.filter.step(replace(self.belief, mean=mean), sample, 0.0, self._rng)
         return self._state(return_phase_variance)
@@ -78,7 +71,7 @@ class KalmanFilter(GaussianSystem):
         if not observed.size:
             return self.last_phase_estimate
         domain = np.linspace(begun, 1.0, self.num_align_samples)
-        predicted = self.basis_model.layout.predict(domain, self.belief.weights_mean[:-1])[:, active]
+        predicted = self.basis_model.layout.predict(domain, self.get_mean()[1:])[:, active]
         index = self.align_func(observed, predicted)
         if not 0 <= index < len(domain):
             raise OptionError(f"align_func: expected an index from 0 to {len(domain) - 1}, got {index!r}")

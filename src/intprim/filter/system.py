@@ -6,15 +6,14 @@ import copy
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from inphase import Channel, DataError, Model, Noise, OptionError, PhaseModel, Role, Scaling, WeightPrior
+from inphase import Channel, Coordinates, Model, Noise, Observation, OptionError, PhaseModel, Role, Scaling, WeightPrior
 from inphase.basis import Layout, Polynomial
-from inphase.filters import Belief, Filter
-from inphase.observation import Observation
-from inphase.preprocess import Coordinates
-from intprim.basis.basis_model import BasisModel, dofs_of
+from inphase.filters import make
+from intprim.basis.basis_model import BasisModel
+from intprim.checks import dofs_of, numbers
 from intprim.filter.cyclical import Cyclical
 
 State = tuple[float, Float[np.ndarray, " n"], Float[np.ndarray, "n n"]]
@@ -27,16 +26,23 @@ class System:
     copy draws the same ones as the original.
     """
 
-    filter: Filter[Any]
-    belief: Belief
+    belief: Any
 
-    def __init__(self, basis_model: BasisModel, phase: PhaseModel, samples: Float[np.ndarray, "N B"]) -> None:
-        if not isinstance(basis_model, BasisModel):
-            raise OptionError(f"basis_model: expected a model of intprim.basis, got a {type(basis_model).__name__}")
-        self.basis_model, self.time_delta = basis_model, 1.0
+    def __init__(
+        self,
+        basis_model: BasisModel,
+        phase: PhaseModel,
+        prior: WeightPrior,
+        name: str,
+        time_delta: float | int = 1.0,
+        **options: Any,
+    ) -> None:
+        self.basis_model, self.time_delta, self.cyclical = basis_model, time_delta, phase.periodic
         self.system_size, self.system_order = len(phase.mean), phase.order
-        self.model = _model(basis_model, phase, samples)
+        self.model = _model(basis_model, phase, prior)
+        self.filter = make(name, self.model, **options)
         self._rng = np.random.default_rng(np.random.randint(2**31))  # noqa: NPY002 - scripts call np.random.seed
+        self.belief = self.filter.init(self._rng)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> System:
         other = copy.copy(self)  # models and beliefs never change
@@ -45,11 +51,11 @@ class System:
 
     def get_mean(self) -> Float[np.ndarray, " n"]:
         """(K + B,) the mean of the state."""
-        raise NotImplementedError
+        return np.asarray(self.belief.state_moments[0][:-1])
 
     def get_covariance(self) -> Float[np.ndarray, "n n"]:
         """(K + B, K + B) the covariance of the state."""
-        raise NotImplementedError
+        return np.asarray(self.belief.state_moments[1][:-1, :-1])
 
     def localize(
         self,
@@ -71,23 +77,18 @@ class System:
     def _state(self, whole: bool) -> State:
         own = slice(0 if whole else self.system_size, None)
         phase = float(self.belief.phase_mean[0])
-        phase = phase % 1.0 if self.model.phase.periodic else min(max(phase, 0.0), 1.0)
+        phase = phase % 1.0 if self.cyclical else min(max(phase, 0.0), 1.0)
         return phase, self.get_mean()[own], self.get_covariance()[own, own]
 
     def _samples(self, measurement: ArrayLike, noise: ArrayLike, active_dofs: ArrayLike) -> list[Observation]:
         count = self.basis_model.num_observed_dof
-        values, noise = np.asarray(measurement, dtype=np.float64), np.asarray(noise, dtype=np.float64)
-        if values.ndim != 2 or values.shape[1] != count:
-            raise DataError(f"measurement: expected (T, D) with D = {count}, got {values.shape}")
-        if noise.shape != (count, count):
-            raise OptionError(f"observation_noise: expected (D, D) = ({count}, {count}), got {noise.shape}")
-        active: Int[np.ndarray, " M"] = np.unique(dofs_of(active_dofs, count, "active_dofs"))
+        values = numbers("measurement", measurement, "T D", finite=False, D=count)
+        noise = numbers("observation_noise", noise, "D D", finite=False, error=OptionError, D=count)
+        active = np.unique(dofs_of(active_dofs, count, "active_dofs"))
         own = noise[np.ix_(active, active)]
         if (own != np.diag(own.diagonal())).any() or not (np.isfinite(own).all() and (own.diagonal() > 0).all()):
-            raise OptionError(
-                "observation_noise: expected a diagonal matrix with variances > 0 of the active DoFs, "
-                f"got {own.tolist()}"
-            )
+            wanted = "a diagonal matrix with variances > 0 of the active DoFs"
+            raise OptionError(f"observation_noise: expected {wanted}, got {own.tolist()}")
         seen = [active[np.isfinite(row[active])] for row in values]
         return [Observation(at, row[at], noise[at, at]) for at, row in zip(seen, values, strict=True)]
 
@@ -100,12 +101,10 @@ def phase_model(
     proc_var: the variance that a time step adds to the highest of them, over time_delta² where that is the velocity.
     Raises OptionError.
     """
-    mean, var = np.asarray(mean, dtype=np.float64), np.asarray(var, dtype=np.float64)
-    if mean.ndim != 1 or not 1 <= len(mean) <= 3 or var.shape != mean.shape or not (var >= 0).all():
-        raise OptionError(
-            "initial_phase_mean, initial_phase_var: expected (K,) each, K = 1, 2 or 3, and variances >= 0, "
-            f"got shapes {mean.shape} and {var.shape}, {var.tolist()}"
-        )
+    mean = numbers("initial_phase_mean", mean, "K", error=OptionError)
+    var = numbers("initial_phase_var", var, "K", error=OptionError, K=len(mean))
+    if not 1 <= len(mean) <= 3 or not (var >= 0).all():
+        raise OptionError(f"initial_phase_var: expected 1, 2 or 3 variances >= 0, got {var.tolist()}")
     if not (0 < time_delta < np.inf and 0 <= proc_var < np.inf):
         raise OptionError(f"expected time_delta > 0 and proc_var >= 0, got {time_delta} and {proc_var}")
     per_step = proc_var * (time_delta**2 if len(mean) == 2 else 1.0)
@@ -113,26 +112,18 @@ def phase_model(
     return PhaseModel(mean, np.diag(var), per_step / time_delta, velocity, cyclical)
 
 
-def weights_of(name: str, values: ArrayLike | None, shape: tuple[int | None, ...]) -> Float[np.ndarray, ...]:
-    """Finite numbers of that shape, None for any length; raises OptionError for others, naming the argument."""
-    array = np.asarray(values if values is not None else np.nan, dtype=np.float64)
-    fits = len(shape) == array.ndim and all(s in (None, n) for s, n in zip(shape, array.shape, strict=True))
-    if not fits or not np.isfinite(array).all():
-        wanted = ", ".join("N" if size is None else str(size) for size in shape)
-        raise OptionError(f"{name}: expected finite numbers of shape ({wanted}), got {array.shape}")
-    return array
+def gaussian_prior(basis_model: BasisModel, mean: ArrayLike, cov: ArrayLike | None) -> WeightPrior:
+    """The prior of weights with mean (B,) and covariance (B, B). Raises OptionError."""
+    size = basis_model.layout.size
+    mean = numbers("mean_basis_weights", mean, "B", error=OptionError, B=size)
+    cov = numbers("cov_basis_weights", cov, "B B", error=OptionError, B=size)
+    try:
+        return WeightPrior.from_moments(mean, cov)
+    except OptionError as error:
+        raise OptionError(f"cov_basis_weights: {error}") from None
 
 
-def samples_of(mean: Float[np.ndarray, " B"], cov: Float[np.ndarray, "B B"]) -> Float[np.ndarray, "N B"]:
-    """(2 B, B) weight vectors that have exactly this mean and sample covariance; OptionError where it is none."""
-    value, vector = np.linalg.eigh((cov + cov.T) / 2)
-    if np.abs(cov - cov.T).max() > 1e-8 * np.abs(cov).max() or value[0] < -1e-8 * max(value[-1], 0.0):
-        raise OptionError("cov_basis_weights: expected a covariance, symmetric with no negative variance")
-    rows = np.sqrt(np.maximum(value, 0.0) * (len(value) - 0.5))[:, None] * vector.T
-    return np.concatenate([mean + rows, mean - rows])
-
-
-def _model(basis_model: BasisModel, phase: PhaseModel, samples: Float[np.ndarray, "N B"]) -> Model:
+def _model(basis_model: BasisModel, phase: PhaseModel, prior: WeightPrior) -> Model:
     """The model of `inphase`: any DoF may be observed, and one beside them, always 0, is controlled by nobody."""
     names = [f"{i} {name}" for i, name in enumerate(basis_model.observed_dof_names)]
     channels = (*(Channel(name, Role.OBSERVED) for name in names), Channel("nobody", Role.CONTROLLED))
@@ -142,7 +133,7 @@ def _model(basis_model: BasisModel, phase: PhaseModel, samples: Float[np.ndarray
         coordinates=Coordinates(channels, np.zeros(count)),
         scaling=Scaling.none(count),
         layout=Layout(tuple(Cyclical(basis) for basis in bases) if phase.periodic else bases),
-        prior=WeightPrior(np.pad(samples, ((0, 0), (0, 1)))),
+        prior=WeightPrior(np.pad(prior.samples, ((0, 0), (0, 1)))),
         noise=Noise(np.ones(count), np.zeros(count)),  # that of the samples is an argument
         phase=phase,
         spread=np.ones(count),

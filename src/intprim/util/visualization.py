@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from inphase import DataError
+from intprim.checks import numbers
 
 
 def plot_distribution(dof_names: Sequence[str], mean: ArrayLike, upper_bound: ArrayLike, lower_bound: ArrayLike) -> Any:
     """Show the mean (D, T) of each DoF within its bounds."""
     figure, axes = _figure(f"Trajectory distribution for degree {name}" for name in dof_names)
-    curves = (_matrix(v, name) for v, name in ((mean, "mean"), (upper_bound, "upper"), (lower_bound, "lower")))
-    for own, middle, upper, lower in zip(axes, *curves, strict=True):
+    for own, middle, upper, lower in zip(axes, *map(_matrix, (mean, upper_bound, lower_bound)), strict=True):
         phases = np.linspace(0, 1, len(middle))
         own.fill_between(phases, lower, upper, color="#ccf5ff")
         own.plot(phases, middle, color="#000000")
@@ -32,7 +31,7 @@ def plot_trajectory(
     """Show an inferred trajectory (D, T) beside the observed one, DoF by DoF over the phase."""
     figure, axes = _figure(f"Trajectory for degree {name}" for name in dof_names)
     for label, values in (("Inferred", trajectory), ("Observed", observed_trajectory), ("Mean", mean_trajectory)):
-        for own, row in zip(axes, _matrix(values, label), strict=True) if values is not None else ():
+        for own, row in zip(axes, _matrix(values), strict=True) if values is not None else ():
             own.plot(np.linspace(0, 1, len(row)), row, label=label)
             own.legend()
     return _shown(figure)
@@ -49,7 +48,7 @@ def plot_partial_trajectory(
         ("Mean", mean_trajectory, {"color": "#85d87f"}),
     ):
         if values is not None:
-            matrix = _matrix(values, label)
+            matrix = _matrix(values)
             if len(matrix) < 2:
                 raise DataError(f"{label.lower()} trajectory: expected at least two DoFs, got {len(matrix)}")
             axes.plot(matrix[0], matrix[1], label=label, **style)
@@ -58,16 +57,13 @@ def plot_partial_trajectory(
 
 
 def plot_approximation(
-    dof_names: Sequence[str],
-    trajectory: ArrayLike,
-    approx_trajectory: ArrayLike,
-    approx_trajectory_deriv: ArrayLike,
+    dof_names: Sequence[str], trajectory: ArrayLike, approx_trajectory: ArrayLike, approx_trajectory_deriv: ArrayLike
 ) -> Any:
     """Show each DoF (D, T) as recorded, as its weights tell it, and the slope of that, over the phase."""
     kinds = ("Original {} Data", "Approximated {} Data", "Approximated {} Derivative")
     figure, axes = _figure(kind.format(name) for name in dof_names for kind in kinds)
     for first, values in enumerate((trajectory, approx_trajectory, approx_trajectory_deriv)):
-        for own, row in zip(axes[first::3], _matrix(values, kinds[first].format("trajectory")), strict=True):
+        for own, row in zip(axes[first::3], _matrix(values), strict=True):
             own.plot(np.linspace(0, 1, len(row)), row)
     return _shown(figure)
 
@@ -75,17 +71,24 @@ def plot_approximation(
 def plot_weights(weight_matrix: ArrayLike) -> Any:
     """Show a matrix of weights, or their covariance, as shades."""
     figure, (axes,) = _figure(["Weights"])
-    figure.colorbar(axes.imshow(_matrix(weight_matrix, "weight_matrix"), cmap="gray", interpolation="none"))
+    figure.colorbar(axes.imshow(_matrix(weight_matrix), cmap="gray", interpolation="none"))
     return _shown(figure)
 
 
-def _figure(titles: Any) -> tuple[Any, Any]:
+def plot_curves(title: str, functions: Callable[[Any], Any]) -> Any:
+    """Show functions of the phases (T,), (T, degree) together, and go on."""
+    figure, (axes,) = _figure([title])
+    phases = np.linspace(0.0, 1.0, 100)
+    axes.plot(phases, functions(phases))
+    return _shown(figure)
+
+
+def _figure(titles: Iterable[str]) -> tuple[Any, Any]:
     from matplotlib import pyplot as plt
 
     titles = list(titles)
-    figure, axes = plt.subplots(
-        len(titles), squeeze=False, layout="constrained", figsize=(6.4, max(4.8, 2 * len(titles)))
-    )
+    size = (6.4, max(4.8, 2 * len(titles)))
+    figure, axes = plt.subplots(len(titles), squeeze=False, layout="constrained", figsize=size)
     for own, title in zip(axes[:, 0], titles, strict=True):
         own.set_title(title)
     return figure, axes[:, 0]
@@ -98,8 +101,5 @@ def _shown(figure: Any) -> Any:
     return figure
 
 
-def _matrix(values: ArrayLike, name: str) -> Float[np.ndarray, "D T"]:
-    array = np.asarray(values, dtype=np.float64)
-    if array.ndim != 2:
-        raise DataError(f"{name}: expected a matrix (D, T), got shape {array.shape}")
-    return array
+def _matrix(values: ArrayLike) -> Any:
+    return numbers("trajectory", values, "D T", finite=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inphase import DataError
+from intprim.checks import numbers
 
 
 def fastdtw(observed_trajectory: ArrayLike, predicted_trajectory: ArrayLike) -> int:
@@ -14,11 +14,8 @@ def fastdtw(observed_trajectory: ArrayLike, predicted_trajectory: ArrayLike) -> 
     Both begin together. A path goes on by a sample of one, the other or both, and pays the Euclidean distance of every
     pair that it visits (Sakoe and Chiba 1978, without a slope constraint). Raises DataError for other shapes.
     """
-    observed, predicted = (np.asarray(t, dtype=np.float64) for t in (observed_trajectory, predicted_trajectory))
-    if observed.ndim != 2 or predicted.ndim != 2 or observed.shape[1] != predicted.shape[1] or not observed.size:
-        raise DataError(
-            f"expected trajectories (T, M) and (N, M) of T, N, M > 0, got {observed.shape} and {predicted.shape}"
-        )
+    predicted = numbers("predicted_trajectory", predicted_trajectory, "N M")
+    observed = numbers("observed_trajectory", observed_trajectory, "T M", M=predicted.shape[1])
     costs = np.full(len(predicted), np.inf)
     for step, sample in enumerate(observed):
         price = np.linalg.norm(predicted - sample, axis=1)

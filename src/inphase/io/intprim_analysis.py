@@ -1,8 +1,7 @@
-"""Read analysis files (XML) of `StatCollector`, the old library's too, as the values that `inphase` works with."""
+"""Read analysis files (XML) of IntPrim's `StatCollector`, the old library's too, as a `Recording` (4.2.9.1)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
@@ -10,21 +9,11 @@ from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 import numpy as np
 from jaxtyping import Float
 
-from inphase import DataError, Dataset, Estimate, Response, Status
-
-
-@dataclass(frozen=True, eq=False)
-class Analysis:
-    """What an analysis file tells.
-
-    dataset: the one interaction, its generated DoFs as controlled channels and all others as observed ones; time is
-    the clock of the file. estimates, responses: one a step. What the file does not hold is NaN: log-likelihoods, and
-    standard deviations of responses but for the first sample of generated DoFs, which old files give in other units.
-    """
-
-    dataset: Dataset
-    estimates: tuple[Estimate, ...]
-    responses: tuple[Response, ...]
+from inphase.channels import make_channels
+from inphase.errors import DataError
+from inphase.recording import Recording
+from inphase.result import Estimate, Response, Status
+from inphase.trajectory import guess_quaternions
 
 
 class _NoDoctype(TreeBuilder):
@@ -32,11 +21,14 @@ class _NoDoctype(TreeBuilder):
         raise DataError(f"refused: it declares a document type {name!r}, with which a file can grow without bound")
 
 
-def read_analysis(path: str | PathLike[str]) -> Analysis:
-    """The interaction, estimates and responses in an analysis file (4.2.9.1).
+def read_analysis(path: str | PathLike[str]) -> Recording:
+    """The interaction, estimates and responses in an analysis file.
 
-    The samples of a step lie evenly between its clock and the one before; a response runs from the estimated phase,
-    or that of a single point, to 1. Raises DataError for a file that is damaged, is none, or declares entities.
+    Its generated DoFs are the controlled channels and all others observed ones; time is the clock of the file. The
+    samples of a step lie evenly between its clock and the one before; a response runs from the estimated phase, or that
+    of a single point, to 1. What the file does not hold is NaN: log-likelihoods, and standard deviations of responses
+    but for the first sample of generated DoFs, which old files give in other units.
+    Raises DataError for a file that is damaged, is none, or declares entities.
     """
     try:
         parser = XMLParser(target=_NoDoctype())  # noqa: S314 - without a document type there are no entities
@@ -50,7 +42,7 @@ def read_analysis(path: str | PathLike[str]) -> Analysis:
         raise DataError(f"{path}: expected an analysis file of IntPrim, got {error}") from None
 
 
-def _analysis(stats: Element, name: str) -> Analysis:
+def _analysis(stats: Element, name: str) -> Recording:
     names = _text(stats, "dof/dof_names").split(",")
     generated = [int(i) for i in _numbers(_node(stats, "dof/generated_indices"))]
     order = [i for i in range(len(names)) if i not in generated] + generated
@@ -79,15 +71,17 @@ def _analysis(stats: Element, name: str) -> Analysis:
         ahead = (phases - phase) / (velocity if velocity > 0 else np.nan)
         channels = tuple(names[i] for i in order)
         responses.append(Response(clock + ahead, phases, mean[:, order], std[:, order], channels))
-    dataset = Dataset.from_arrays(
-        [np.concatenate([np.empty(0), *times])],
-        [np.concatenate([np.empty((0, len(names))), *values])],
-        observed=[names[i] for i in order[: len(names) - len(generated)]],
-        controlled=[names[i] for i in generated],
-        names=[name],
-        provenance={"bag": _text(stats, "bag_name")},
+    observed, controlled = [names[i] for i in order[: len(order) - len(generated)]], [names[i] for i in generated]
+    readings = np.concatenate([np.empty((0, len(names))), *values])
+    return Recording(
+        name,
+        make_channels(observed, controlled, kinds=guess_quaternions([*observed, *controlled], [readings])),
+        np.concatenate([np.empty(0), *times]),
+        readings,
+        tuple(estimates),
+        tuple(responses),
+        {"bag": _text(stats, "bag_name")},
     )
-    return Analysis(dataset, tuple(estimates), tuple(responses))
 
 
 def _node(parent: Element, path: str) -> Element:

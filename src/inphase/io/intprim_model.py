@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import NDArray
 
-from inphase import ModelFileError
+from inphase.errors import ModelFileError
 
 # The names that numpy arrays and MinMaxScalers are written with, from Python 2.7 to today (numpy 2 says `numpy._core`).
 RECONSTRUCT, FROM_BUFFER = "numpy.core.multiarray._reconstruct", "numpy.core.numeric._frombuffer"
