@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import ArrayLike
 from inphase import DataError
 from inphase.basis import Basis, Layout
 from intprim.checks import Numbers, dofs_of, names_of, numbers
-from intprim.util.visualization import plot_curves
+from intprim.util.visualization import plot_functions
 
 Functions = Callable[[Any], Any]  # of phases (T,): (T, degree)
 
@@ -96,21 +95,18 @@ class SharedBasisModel(BasisModel):
 
     def plot(self) -> None:
         """Show the functions over the phase."""
-        plot_curves("Basis Functions", self.basis)
+        plot_functions("Basis Functions", self.basis)
 
     def plot_derivative(self) -> None:
         """Show the slopes of the functions over the phase."""
-        plot_curves("Basis Function Derivatives", lambda phases: self.basis.with_derivative(phases)[1])
+        plot_functions("Basis Function Derivatives", lambda phases: self.basis.with_derivative(phases)[1])
 
     def plot_weighted(self, coefficients: Numbers, coefficient_names: ArrayLike) -> None:
         """Show the functions times their weights (D, degree), a figure for every DoF; DataError for another shape."""
         names = names_of(coefficient_names, "coefficient_names")
         weights = numbers("coefficients", coefficients, "D degree", D=len(names), degree=self._degree)
         for name, own in zip(names, weights, strict=True):
-            plot_curves(f"Basis Functions For Dimension {name}", partial(self._weighted, own))
-
-    def _weighted(self, weights: Float[np.ndarray, " Bd"], phases: Float[np.ndarray, " T"]) -> Any:
-        return self.basis(phases) * weights
+            plot_functions(f"Basis Functions For Dimension {name}", self.basis, own)
 
 
 def _phases(x: Numbers) -> Float[np.ndarray, "*T"]:

@@ -108,8 +108,7 @@ def phase_model(
     if not (0 < time_delta < np.inf and 0 <= proc_var < np.inf):
         raise OptionError(f"expected time_delta > 0 and proc_var >= 0, got {time_delta} and {proc_var}")
     per_step = proc_var * (time_delta**2 if len(mean) == 2 else 1.0)
-    velocity = float(mean[1]) if len(mean) > 1 and mean[1] > 0 else 1.0  # no filter here reads the nominal one
-    return PhaseModel(mean, np.diag(var), per_step / time_delta, velocity, cyclical)
+    return PhaseModel(mean, np.diag(var), per_step / time_delta, nominal_velocity=1.0, periodic=cyclical)  # not read
 
 
 def gaussian_prior(basis_model: BasisModel, mean: ArrayLike, cov: ArrayLike | None) -> WeightPrior:

@@ -65,13 +65,11 @@ class StatCollector:
         mean = np.array(used.get_mean())
         mean[0] = mean[0] % 1.0 if used.cyclical else np.clip(mean[0], 0.0, 1.0)
         members = used.ensemble[used.system_size :].T if hasattr(used, "ensemble") else np.empty((0, 2))
-        observed, generated = (
-            numbers(name, np.reshape(values, (0, count)) if np.size(values) == 0 else values, "T D", D=count)
-            for name, values in (
-                ("observed_trajectory", observed_trajectory),
-                ("generated_trajectory", generated_trajectory),
-            )
+        observed = (
+            np.reshape(observed_trajectory, (0, count)) if np.size(observed_trajectory) == 0 else observed_trajectory
         )
+        observed = numbers("observed_trajectory", observed, "T D", finite=False, D=count)
+        generated = numbers("generated_trajectory", generated_trajectory, "T D", D=count)
         clock = None if timestamp is None else float(timestamp)
         self.steps.append(Step(clock, observed, generated, mean, used.get_covariance(), members))
 

@@ -75,11 +75,11 @@ def plot_weights(weight_matrix: ArrayLike) -> Any:
     return _shown(figure)
 
 
-def plot_curves(title: str, functions: Callable[[Any], Any]) -> Any:
-    """Show functions of the phases (T,), (T, degree) together, and go on."""
+def plot_functions(title: str, functions: Callable[[Any], Any], weights: Any = 1.0) -> Any:
+    """Show functions of the phase, (T,) -> (T, degree), together in one picture, each times its weight."""
     figure, (axes,) = _figure([title])
     phases = np.linspace(0.0, 1.0, 100)
-    axes.plot(phases, functions(phases))
+    axes.plot(phases, functions(phases) * weights)
     return _shown(figure)
 
 
