@@ -166,6 +166,25 @@ def test_the_facade_uses_public_names_only():
     }
 
 
+def lines_of_code(path: Path) -> int:
+    """Lines with anything but comments and docstrings on them."""
+    text, tree = path.read_text(encoding="utf-8"), parsed(path)
+    owners = [n for n in ast.walk(tree) if isinstance(n, ast.Module | ast.ClassDef | ast.FunctionDef)]
+    docs = [owner.body[0] for owner in owners if ast.get_docstring(owner) is not None]
+    said = {line for doc in docs for line in range(doc.lineno, (doc.end_lineno or 0) + 1)}
+    lines = enumerate(text.splitlines(), 1)
+    return sum(1 for number, line in lines if number not in said and line.strip() and line.strip()[0] != "#")
+
+
+def test_the_facade_is_thin():
+    assert sum(map(lines_of_code, (SRC / "intprim").rglob("*.py"))) < 900
+
+
+def test_lines_of_code_are_counted(tmp_path):
+    (tmp_path / "a.py").write_text('"""A\n\nB."""\n\n# c\ndef f():\n    """D."""\n    return """\nx"""  # e\n')
+    assert lines_of_code(tmp_path / "a.py") == 3
+
+
 def test_a_facade_that_reaches_inside_is_found():
     good = "import inphase\nfrom inphase import Model, fit\nfrom inphase.basis import Gaussian\nfrom . import basis"
     assert facade_trespasses(ast.parse(good)) == []

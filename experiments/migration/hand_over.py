@@ -57,7 +57,7 @@ class Primitive:
         intprim.examples.train_model(primitive, trajectories)
         velocity_mean, velocity_var = intprim.examples.get_phase_stats(trajectories)
         phase = ([0.0, velocity_mean], [PHASE_VAR, velocity_var], PROCESS_VAR)
-        np.random.seed(0)
+        np.random.seed(0)  # noqa: NPY002 - as scripts do
         if kind == "ebip":
             of = intprim.filter.spatiotemporal.EnsembleKalmanFilter(basis, *phase, primitive.basis_weights)
         else:
