@@ -39,6 +39,7 @@ def _run(arguments: Sequence[str]) -> int:
     from inphase.cli.fit import fit
     from inphase.cli.inspect import inspect
     from inphase.cli.replay import replay
+    from inphase.cli.select import select
     from inphase.cli.validate import validate
 
     commands: dict[str, Callable[..., int]] = {
@@ -48,6 +49,7 @@ def _run(arguments: Sequence[str]) -> int:
         "inspect": inspect,
         "replay": replay,
         "evaluate": evaluate,
+        "select": select,
     }
     # The products of a filter are small: two threads make each slower, many times so on a busy machine.
     with threadpool_limits(limits=1):

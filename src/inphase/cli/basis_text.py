@@ -24,9 +24,11 @@ def parse_basis(text: str) -> Basis:
 
 
 def show_basis(basis: Basis) -> str:
-    """The shortest such text of a basis: without the arguments that are the usual ones."""
+    """The shortest such text of a basis: without the arguments that are the usual ones. Centres are not spelled."""
     family = next(name for name, kind in FAMILIES.items() if isinstance(basis, kind))
     named = list(basis.parameters().items())
+    if "centres" in basis.parameters():
+        return f"{family}:{basis.size} placed"
     while len(named) > 1 and make(family, **dict(named[:-1])) == basis:
         named.pop()
     return ":".join([family, *(f"{value:.3g}" for _, value in named)])

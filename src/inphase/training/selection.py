@@ -1,0 +1,228 @@
+"""Which basis functions suit the demonstrations: families, sizes and widths by three criteria (4.2.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from inphase.arrays import freeze
+from inphase.basis import Basis, Gaussian, Periodic, Polynomial, Sigmoid
+from inphase.errors import DataError, OptionError, listing
+from inphase.preprocess.coordinates import Coordinates
+from inphase.trajectory import Dataset
+
+CRITERIA = ("aic", "bic", "held-out")
+PER = ("all", "group", "channel")
+FAMILIES = ("gaussian", "sigmoid", "polynomial")
+SIZES = (4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 17, 20, 25, 30, 40)
+VARIANCES = (0.01, 0.02, 0.05, 0.1, 0.2)  # of Gaussians whose outer centres are 0 and 1, as IntPrim counts widths
+STEPS = (0.02, 0.05, 0.1, 0.2)  # widths of logistic steps [phase]
+FEWEST, MOST = 50, 200  # phases at which demonstrations are compared
+SHORTER = 0.1  # of the demonstrations have fewer readings than that
+ROUNDING = 1e-12  # of a feature's variance: an error below is none
+STILL, LEAST = 1e-7, 1e-100  # of the size of a feature, and of nothing: what counts as movement
+
+
+@dataclass(frozen=True, eq=False)
+class BasisSelection:
+    """How well each candidate suits each unit: a channel, a group, or all of them; lower is better.
+
+    units: their names. members: the channels of each. aic, bic: (U, C) the criteria of Akaike and Schwarz. scores:
+    (U, C, N) -2 log likelihood of each demonstration under the Gaussian of all others. All are for a reading, and inf
+    where a candidate has too many functions. error_std: (U, C) the root mean square of the residuals, in the spread of
+    the channels, or the size of those that rest.
+    """
+
+    candidates: tuple[Basis, ...]
+    units: tuple[str, ...]
+    members: tuple[tuple[str, ...], ...]
+    aic: Float[np.ndarray, "U C"]
+    bic: Float[np.ndarray, "U C"]
+    scores: Float[np.ndarray, "U C N"]
+    error_std: Float[np.ndarray, "U C"]
+
+    def __post_init__(self) -> None:
+        freeze(self, aic=self.aic, bic=self.bic, scores=self.scores, error_std=self.error_std)
+
+    @property
+    def held_out(self) -> Float[np.ndarray, "U C"]:
+        """(U, C) the mean score of the demonstrations."""
+        return np.asarray(self.scores.mean(-1))
+
+    def values(self, criterion: str = "held-out") -> Float[np.ndarray, "U C"]:
+        """(U, C) the values of a criterion; raises OptionError for an unknown one."""
+        if criterion not in CRITERIA:
+            raise OptionError(f"unknown criterion {criterion!r}; one of {listing(CRITERIA)}")
+        return {"aic": self.aic, "bic": self.bic, "held-out": self.held_out}[criterion]
+
+    def ranking(self, unit: str | None = None, criterion: str = "held-out") -> list[tuple[Basis, float]]:
+        """The candidates for a unit (the only one, if there is but one), the best first, with their values."""
+        if unit is None and len(self.units) == 1:
+            unit = self.units[0]
+        if unit not in self.units:
+            raise OptionError(f"unknown unit {unit!r}; one of {listing(self.units)}")
+        values = self.values(criterion)[self.units.index(unit)]
+        return [(self.candidates[i], float(values[i])) for i in np.argsort(values, kind="stable")]
+
+    def chosen(self, criterion: str = "held-out") -> list[int]:
+        """The candidate for each unit: that of the least criterion.
+
+        Held out, the demonstrations differ: of those that score worse than the least by no more than the standard error
+        of the difference, the one with the fewest functions.
+        """
+        values = self.values(criterion)
+        if criterion != "held-out":
+            return [int(i) for i in values.argmin(1)]
+        sizes, chosen = np.array([basis.size for basis in self.candidates]), []
+        for own, scores in zip(values, self.scores, strict=True):
+            known = np.flatnonzero(np.isfinite(own))
+            off = scores[known] - scores[own.argmin()]
+            near = known[off.mean(1) <= off.std(1, ddof=1) / np.sqrt(off.shape[1])]
+            chosen.append(int(min(near, key=lambda i: (sizes[i], own[i]))))
+        return chosen
+
+    def best(self, criterion: str = "held-out") -> dict[str, Basis]:
+        """The chosen basis of every channel, as `inphase.fit(basis=…)` takes them."""
+        chosen = self.chosen(criterion)
+        return {name: self.candidates[i] for names, i in zip(self.members, chosen, strict=True) for name in names}
+
+
+def select_basis(
+    dataset: Dataset,
+    *,
+    candidates: Iterable[Basis] | None = None,
+    families: Sequence[str] = FAMILIES,
+    sizes: Sequence[int] = SIZES,
+    per: str = "all",
+    periodic: bool = False,
+) -> BasisSelection:
+    """Compare basis functions on demonstrations.
+
+    candidates: what is compared; else every family with every size and a few widths (4.2.2). per: "channel", "group" or
+    "all", what has a basis of its own. All demonstrations are brought to the same phases, as many as the usual one has
+    readings, so that a candidate is fitted to all of them by one factorisation. Noise is estimated, not named.
+    Raises DataError for fewer than three demonstrations (nothing could be held out) or a channel that was never seen,
+    OptionError for names and numbers that make no grid.
+    """
+    if per not in PER:
+        raise OptionError(f"per: expected one of {listing(PER)}, got {per!r}")
+    if len(dataset) < 3:
+        raise DataError(f"expected at least 3 demonstrations to compare bases on, got {len(dataset)}")
+    chosen = tuple(candidates) if candidates is not None else tuple(grid(families, sizes, periodic))
+    if not chosen:
+        raise OptionError("expected at least one candidate, got none")
+    coordinates = Coordinates.learn(dataset.channels, [d.values for d in dataset])
+    around = [basis.periodic for basis in chosen]
+    if any(around) and not all(around):
+        raise OptionError("expected candidates that are all periodic or none, got both")
+    curves = _curves(dataset, coordinates, any(around))
+    found = np.full((3 + len(dataset), coordinates.count, len(chosen)), np.inf)
+    phases = _phases(curves.shape[-1], any(around))
+    for which in _alike(chosen):
+        if chosen[which[0]].size <= len(phases) // 2:
+            found[:, :, which] = _criteria(np.stack([chosen[i](phases) for i in which]), curves)
+    units = _units(dataset, coordinates, per)
+    aic, bic, error, *scores = (np.stack([table[of].mean(0) for of in units.values()]) for table in found)
+    members = tuple(_names(dataset, coordinates, features) for features in units.values())
+    return BasisSelection(chosen, tuple(units), members, aic, bic, np.stack(scores, axis=-1), np.sqrt(error))
+
+
+def grid(families: Sequence[str] = FAMILIES, sizes: Sequence[int] = SIZES, periodic: bool = False) -> Iterator[Basis]:
+    """The candidates: Gaussians as `fit` uses them and as IntPrim placed them, steps and polynomials of every size."""
+    unknown = [name for name in families if name not in FAMILIES]
+    if unknown:
+        raise OptionError(f"unknown family {unknown[0]!r}; one of {listing(FAMILIES)}")
+    for size in sizes:
+        if periodic:
+            yield Periodic(size)
+            continue
+        if "gaussian" in families:
+            yield Gaussian(size)
+            yield from (Gaussian(size, float(np.sqrt(var)), margin=0.0) for var in VARIANCES)
+        if "sigmoid" in families:
+            yield Sigmoid(size)
+            yield from (Sigmoid(size, width) for width in STEPS)
+        if "polynomial" in families:
+            yield Polynomial(size - 1)
+
+
+def _alike(candidates: Sequence[Basis]) -> list[list[int]]:
+    """The candidates of each size, which are factorised together."""
+    by_size: dict[int, list[int]] = {}
+    for i, basis in enumerate(candidates):
+        by_size.setdefault(basis.size, []).append(i)
+    return list(by_size.values())
+
+
+def _criteria(functions: Float[np.ndarray, "C G B"], curves: Float[np.ndarray, "N F G"]) -> Float[np.ndarray, "_ F C"]:
+    """AIC, BIC, the mean squared error over the variance, and -2 log likelihood of each demonstration held out."""
+    (count, features, length), (some, _, size) = curves.shape, functions.shape
+    basis = np.linalg.qr(functions)[0]  # orthonormal: what it leaves over is noise, whatever the condition number
+    flat = curves.reshape(-1, length)
+    weights = (flat @ basis).reshape(some, count, features, size).transpose(0, 2, 1, 3)  # (C, F, N, B)
+    size_of = np.abs(curves).max(axis=(0, 2)) ** 2 + LEAST
+    variance = np.maximum(curves.var(axis=(0, 2)), STILL**2 * size_of)
+    left = (curves**2).sum(-1).T - (weights**2).sum(-1)  # (C, F, N)
+    left = np.maximum(left, length * ROUNDING * variance[:, None])
+    error = left.mean(-1) / length
+    likelihood = length * (np.log(2 * np.pi * error) + 1)  # -2 log, at the variance that makes it likeliest
+    aic, bic = likelihood + 2 * size, likelihood + np.log(length) * size
+
+    # A demonstration under the Gaussian of the others (Eq. 2.11, 2.14): in orthonormal weights, what the basis cannot
+    # say is noise, and the covariance that lacks one of them is that of all but for a term of rank 1.
+    noise = left.mean(-1) / (length - size)
+    off = weights - weights.mean(2, keepdims=True)
+    cov = off.swapaxes(-1, -2) @ off / (count - 2) + noise[..., None, None] * np.eye(size)
+    factor = np.linalg.cholesky(cov)
+    white = np.linalg.solve(factor, off.swapaxes(-1, -2))
+    alpha = count / ((count - 1) * (count - 2))
+    within = (white**2).sum(-2)  # (C, F, N)
+    kept = np.maximum(1 - alpha * within, np.finfo(float).eps)
+    ratio = (count / (count - 1)) ** 2
+    log_det = 2 * np.log(np.diagonal(factor, axis1=-2, axis2=-1)).sum(-1)
+    said = log_det[..., None] + np.log(kept) + ratio * within / kept
+    unsaid = (length - size) * np.log(noise)[..., None] + left / noise[..., None]
+    scores = said + unsaid + length * np.log(2 * np.pi)
+    figures = np.stack([aic / length, bic / length, error / np.where(variance > STILL**2 * size_of, variance, size_of)])
+    return np.concatenate([figures, np.moveaxis(scores, -1, 0) / length]).swapaxes(1, 2)
+
+
+def _curves(dataset: Dataset, coordinates: Coordinates, periodic: bool) -> Float[np.ndarray, "N F G"]:
+    """Every feature of every demonstration at the same phases; gaps are bridged, and what was not seen is the mean."""
+    # No more than the shorter ones have readings: between two of them there is no news, and noise would look smooth.
+    readings = int(np.quantile([len(demonstration) for demonstration in dataset], SHORTER))
+    phases = _phases(min(max(readings, FEWEST), MOST), periodic)
+    curves = np.full((len(dataset), coordinates.count, len(phases)), np.nan)
+    for curve, demonstration in zip(curves, dataset, strict=True):
+        for own, feature in zip(curve, coordinates.from_channels(demonstration.values).T, strict=True):
+            seen = ~np.isnan(feature)
+            if seen.any():
+                own[:] = np.interp(phases, demonstration.phases[seen], feature[seen])
+    never = np.isnan(curves).all(axis=(0, 2))
+    if never.any():
+        name = dataset.names[coordinates.channel_of[int(np.argmax(never))][0]]
+        raise DataError(f"channel {name!r}: expected readings, got none in any of {len(dataset)} demonstrations")
+    return np.where(np.isnan(curves), np.nanmean(curves, axis=0), curves)
+
+
+def _phases(count: int, periodic: bool) -> Float[np.ndarray, " G"]:
+    return np.linspace(0.0, 1.0, count, endpoint=not periodic)
+
+
+def _units(dataset: Dataset, coordinates: Coordinates, per: str) -> dict[str, list[int]]:
+    """The features of each unit, by its name."""
+    if per == "all":
+        return {"all channels": list(range(coordinates.count))}
+    names = coordinates.groups if per == "group" else [dataset.names[of[0]] for of in coordinates.channel_of]
+    units: dict[str, list[int]] = {}
+    for feature, name in enumerate(names):
+        units.setdefault(name, []).append(feature)
+    return units
+
+
+def _names(dataset: Dataset, coordinates: Coordinates, features: Sequence[int]) -> tuple[str, ...]:
+    """The channels that features are made of."""
+    return tuple(dict.fromkeys(dataset.names[i] for f in features for i in coordinates.channel_of[f]))
