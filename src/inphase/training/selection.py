@@ -125,9 +125,10 @@ def select_basis(
         if chosen[which[0]].size <= len(phases) // 2:
             found[:, :, which] = _criteria(np.stack([chosen[i](phases) for i in which]), curves)
     units = _units(dataset, coordinates, per)
-    aic, bic, error, *scores = (np.stack([table[of].mean(0) for of in units.values()]) for table in found)
+    table = np.stack([found[:, of].mean(1) for of in units.values()], axis=1)
     members = tuple(_names(dataset, coordinates, features) for features in units.values())
-    return BasisSelection(chosen, tuple(units), members, aic, bic, np.stack(scores, axis=-1), np.sqrt(error))
+    aic, bic, error, scores = table[0], table[1], table[2], np.moveaxis(table[3:], 0, -1)
+    return BasisSelection(chosen, tuple(units), members, aic, bic, scores, np.sqrt(error))
 
 
 def grid(families: Sequence[str] = FAMILIES, sizes: Sequence[int] = SIZES, periodic: bool = False) -> Iterator[Basis]:
@@ -157,15 +158,14 @@ def _alike(candidates: Sequence[Basis]) -> list[list[int]]:
     return list(by_size.values())
 
 
-def _criteria(functions: Float[np.ndarray, "C G B"], curves: Float[np.ndarray, "N F G"]) -> Float[np.ndarray, "_ F C"]:
+def _criteria(functions: Float[np.ndarray, "C G B"], curves: Float[np.ndarray, "F N G"]) -> Float[np.ndarray, "_ F C"]:
     """AIC, BIC, the mean squared error over the variance, and -2 log likelihood of each demonstration held out."""
-    (count, features, length), (some, _, size) = curves.shape, functions.shape
+    (features, count, length), (some, _, size) = curves.shape, functions.shape
     basis = np.linalg.qr(functions)[0]  # orthonormal: what it leaves over is noise, whatever the condition number
-    flat = curves.reshape(-1, length)
-    weights = (flat @ basis).reshape(some, count, features, size).transpose(0, 2, 1, 3)  # (C, F, N, B)
-    size_of = np.abs(curves).max(axis=(0, 2)) ** 2 + LEAST
-    variance = np.maximum(curves.var(axis=(0, 2)), STILL**2 * size_of)
-    left = (curves**2).sum(-1).T - (weights**2).sum(-1)  # (C, F, N)
+    weights = (curves.reshape(-1, length) @ basis).reshape(some, features, count, size)
+    size_of = np.abs(curves).max(axis=(1, 2)) ** 2 + LEAST
+    variance = np.maximum(curves.var(axis=(1, 2)), STILL**2 * size_of)
+    left = np.einsum("fng,fng->fn", curves, curves) - np.einsum("cfnb,cfnb->cfn", weights, weights)
     left = np.maximum(left, length * ROUNDING * variance[:, None])
     error = left.mean(-1) / length
     likelihood = length * (np.log(2 * np.pi * error) + 1)  # -2 log, at the variance that makes it likeliest
@@ -177,9 +177,9 @@ def _criteria(functions: Float[np.ndarray, "C G B"], curves: Float[np.ndarray, "
     off = weights - weights.mean(2, keepdims=True)
     cov = off.swapaxes(-1, -2) @ off / (count - 2) + noise[..., None, None] * np.eye(size)
     factor = np.linalg.cholesky(cov)
-    white = np.linalg.solve(factor, off.swapaxes(-1, -2))
+    white = off @ np.linalg.inv(factor).swapaxes(-1, -2)
     alpha = count / ((count - 1) * (count - 2))
-    within = (white**2).sum(-2)  # (C, F, N)
+    within = np.einsum("cfnb,cfnb->cfn", white, white)
     kept = np.maximum(1 - alpha * within, np.finfo(float).eps)
     ratio = (count / (count - 1)) ** 2
     log_det = 2 * np.log(np.diagonal(factor, axis1=-2, axis2=-1)).sum(-1)
@@ -190,22 +190,23 @@ def _criteria(functions: Float[np.ndarray, "C G B"], curves: Float[np.ndarray, "
     return np.concatenate([figures, np.moveaxis(scores, -1, 0) / length]).swapaxes(1, 2)
 
 
-def _curves(dataset: Dataset, coordinates: Coordinates, periodic: bool) -> Float[np.ndarray, "N F G"]:
+def _curves(dataset: Dataset, coordinates: Coordinates, periodic: bool) -> Float[np.ndarray, "F N G"]:
     """Every feature of every demonstration at the same phases; gaps are bridged, and what was not seen is the mean."""
     # No more than the shorter ones have readings: between two of them there is no news, and noise would look smooth.
     readings = int(np.quantile([len(demonstration) for demonstration in dataset], SHORTER))
     phases = _phases(min(max(readings, FEWEST), MOST), periodic)
-    curves = np.full((len(dataset), coordinates.count, len(phases)), np.nan)
-    for curve, demonstration in zip(curves, dataset, strict=True):
-        for own, feature in zip(curve, coordinates.from_channels(demonstration.values).T, strict=True):
-            seen = ~np.isnan(feature)
-            if seen.any():
-                own[:] = np.interp(phases, demonstration.phases[seen], feature[seen])
-    never = np.isnan(curves).all(axis=(0, 2))
+    curves = np.full((coordinates.count, len(dataset), len(phases)), np.nan)
+    for i, demonstration in enumerate(dataset):
+        features, at = coordinates.from_channels(demonstration.values), demonstration.phases
+        seen = ~np.isnan(features)
+        for own, feature, there in zip(curves, features.T, seen.T, strict=True):
+            if there.any():
+                own[i] = np.interp(phases, at[there], feature[there])
+    never = np.isnan(curves).all(axis=(1, 2))
     if never.any():
         name = dataset.names[coordinates.channel_of[int(np.argmax(never))][0]]
         raise DataError(f"channel {name!r}: expected readings, got none in any of {len(dataset)} demonstrations")
-    return np.where(np.isnan(curves), np.nanmean(curves, axis=0), curves)
+    return np.where(np.isnan(curves), np.nanmean(curves, axis=1, keepdims=True), curves)
 
 
 def _phases(count: int, periodic: bool) -> Float[np.ndarray, " G"]:
