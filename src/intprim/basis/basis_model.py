@@ -93,13 +93,13 @@ class SharedBasisModel(BasisModel):
         """(degree,) the slopes of the functions at a phase, or (degree, T) at T of them."""
         return self.basis.with_derivative(_phases(x))[1].T
 
-    def plot(self) -> None:
+    def plot(self) -> Any:
         """Show the functions over the phase."""
-        plot_functions("Basis Functions", self.basis)
+        return plot_functions("Basis Functions", self.basis)
 
-    def plot_derivative(self) -> None:
+    def plot_derivative(self) -> Any:
         """Show the slopes of the functions over the phase."""
-        plot_functions("Basis Function Derivatives", lambda phases: self.basis.with_derivative(phases)[1])
+        return plot_functions("Basis Function Derivatives", lambda phases: self.basis.with_derivative(phases)[1])
 
     def plot_weighted(self, coefficients: Numbers, coefficient_names: ArrayLike) -> None:
         """Show the functions times their weights (D, degree), a figure for every DoF; DataError for another shape."""
