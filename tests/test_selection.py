@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +18,7 @@ from inphase.basis import Basis, Gaussian, Periodic, Polynomial, Sigmoid
 from inphase.cli import main
 from inphase.training.selection import SIZES, BasisSelection, grid, select_basis
 
+ROOT = Path(__file__).parents[1]
 TRUE = (Gaussian(8, math.sqrt(0.1), margin=0.0), Sigmoid(8, 0.05))
 
 
@@ -214,6 +218,13 @@ def test_the_command_ranks_and_draws(recordings, capsys) -> None:
     described = json.loads(capsys.readouterr().out)
     assert [unit["channels"] for unit in described["units"]] == [["c0", "c1"]]
     assert set(described["best"]) == {"aic", "bic", "held-out"}
+
+
+def test_the_benchmark_compares_with_a_loop() -> None:
+    command = [sys.executable, str(ROOT / "benchmarks" / "selection.py"), "--quick"]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert "75 candidates, 5 demonstrations of 2 channels" in said
+    assert "times faster" in said
 
 
 def test_the_command_tells_mistakes_in_a_line(recordings, capsys) -> None:
