@@ -2,7 +2,7 @@
 
     python benchmarks/selection.py [--quick]
 
-Both compare the grid of the dissertation's library (4.2.2) on demonstrations of two channels, and both give AIC and BIC;
+Both compare the grid of the dissertation's library (4.2.2) on demonstrations of two channels, and give AIC and BIC;
 held-out likelihoods are given by `select_basis` alone. By turns, in processor time: the shortest of each counts.
 """
 
