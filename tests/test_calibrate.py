@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -16,6 +17,7 @@ from inphase.evidence import Evidence, Trial
 from inphase.metrics import Errors
 from inphase.training import rehearsal
 from inphase.training.calibrate import CHOICES, Calibration, Candidate
+from inphase.training.fit import _proposed as proposed
 from inphase.training.rehearsal import CONDITIONS, Rehearsal, play, rehearsals, relative
 from inphase.training.workers import workers
 
@@ -179,6 +181,54 @@ def test_what_is_given_is_not_chosen(demos: inphase.Dataset, calibrated: inphase
     assert {t.choice for t in model.evidence.trials} == {"before", "reflex", "band"}
     assert model.tempo.usual == 0.6
     assert_array_equal(model.noise.correlation_time, calibrated.noise.correlation_time)
+
+
+@pytest.mark.parametrize(("ripples", "more"), [(0, False), (9, True)])
+def test_as_many_functions_are_proposed_as_the_movement_needs(
+    ripples: int, more: bool, rng: np.random.Generator
+) -> None:
+    """Twenty functions cannot follow nine waves; a glide needs fewer."""
+    times, values = [], []
+    for _ in range(8):
+        t, height = np.linspace(0, 3, 150), rng.normal(1, 0.3)
+        wave = height * (np.sin(2 * np.pi * ripples * t / 3) if ripples else 1.0)
+        values.append(np.stack([t + wave, wave - t], axis=1) + 0.01 * rng.normal(size=(150, 2)))
+        times.append(t)
+    demos = inphase.Dataset.from_arrays(times, values, ["a"], ["b"])
+    basis = proposed(demos, inphase.fit(demos, calibrate=False))
+    assert basis is not None
+    assert (basis.size > 20) == more
+
+
+@pytest.mark.parametrize(("size", "taken"), [(0.5, True), (0.999, False), (1.5, False)])
+def test_another_basis_is_taken_where_it_follows_better_by_more_than_chance(
+    size: float, taken: bool, model: inphase.Model
+) -> None:
+    stage = Stage(model, {0.8: 1.0, 0.6: size})
+    calibration = staged(model, stage)
+    otherwise = replace(model, tempo=replace(model.tempo, usual=0.6))
+    still = stage.held_out[0].variations
+    assert calibration.consider("basis", "9 functions", [Rehearsal(otherwise, still) for _ in range(6)]) == taken
+    assert [t.chosen for t in calibration.trials if t.choice == "basis"] == [not taken, taken]
+    # What is chosen next is compared with what was taken.
+    calibration.choose("usual tempo", [usual(0.6)])
+    assert calibration.trials[-1].error == pytest.approx(size**2, rel=0.2)
+    assert calibration.trials[-2].error == pytest.approx(size**2 if taken else 1.0, rel=0.2)
+
+
+@pytest.mark.parametrize("given", [{}, {"basis": inphase.basis.Gaussian(7)}, {"prior": None}])
+def test_only_a_basis_that_nobody_named_is_chosen(
+    given: dict, demos: inphase.Dataset, model: inphase.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module, offered = sys.modules["inphase.training.fit"], []
+    monkeypatch.setattr(module, "calibrated", lambda *a, **k: offered.append(k["alternative"]) or a[1])
+    fitted = inphase.fit(demos, **{name: value or model.prior for name, value in given.items()})
+    assert fitted.layout.bases[0].size == (7 if "basis" in given else 20)
+    (alternative,) = offered
+    assert (alternative is None) == bool(given)
+    if alternative is not None:
+        assert alternative.learn(demos).layout == alternative.model.layout
+        assert alternative.value == f"{alternative.model.layout.bases[0].size} functions"
 
 
 def test_two_processes_find_what_one_finds(model: inphase.Model, demos: inphase.Dataset) -> None:

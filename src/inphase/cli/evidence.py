@@ -21,6 +21,7 @@ NAME, ERROR, INSIDE, NLL = 38, 17, 9, 9  # of the table
 TOGETHER = "\xa0"  # a blank at which no line ends
 UNCHANGED = "as it is"  # of a trial: with what was there before
 MEANING = {
+    "basis": "how many basis functions a channel has; as many as held-out ones ask for",
     "noise lasts": "how long a deviation persists; if longer, each sample counts less",
     "trust": "in what the partner's movement tells beyond its timing; 0: timing alone",
     "usual tempo": "how many interactions go at the tempo of the demonstrations",

@@ -1,4 +1,4 @@
-"""Calibration: noise, trust, tempo, shrinkage, reflex and band, chosen by held-out demonstrations.
+"""Calibration: basis, noise, trust, tempo, shrinkage, reflex and band, chosen by held-out demonstrations.
 
 Every choice starts from what was learned without playing anything, and changes only for a candidate that is better by
 more than its standard error: a handful of demonstrations is easily flattered. What counts is the relative gain, so that
@@ -77,6 +77,15 @@ CHOICES: dict[str, tuple[Candidate, ...]] = {
 }
 
 
+@dataclass(frozen=True)
+class Alternative:
+    """Another model of the same data set, `value` in words, and how one of a part of it is learned."""
+
+    value: str
+    model: Model
+    learn: Callable[[Dataset], Model]
+
+
 class Calibration:
     """The choices so far, and their evidence."""
 
@@ -86,6 +95,21 @@ class Calibration:
         self.trials: list[Trial] = []
         self.errors = self._play(None)
         self._note("before", "as learned", self.errors, chosen=True)
+
+    def consider(self, choice: str, value: str, held_out: Sequence[Rehearsal]) -> bool:
+        """Play models that were learned otherwise and, if they are better by more than chance, go on with them."""
+        there = self._held_out
+        self._held_out = held_out
+        errors = self._play(None)
+        gain, doubt = self._gain(errors)
+        better = gain > doubt
+        self._note(choice, "as it is", self.errors, chosen=not better)
+        self._note(choice, value, errors, chosen=better)
+        if better:
+            self.errors = errors
+        else:
+            self._held_out = there
+        return better
 
     def choose(self, choice: str, candidates: Sequence[Candidate]) -> None:
         """Play every candidate and keep the best, if it is better than what is there by more than chance."""
@@ -143,16 +167,18 @@ def calibrate(
     model: Model,
     learn: Callable[[Dataset], Model],
     *,
+    alternative: Alternative | None = None,
     fixed: Sequence[str] = (),
     jobs: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> Model:
     """The model with everything chosen that is not in `fixed`, and the evidence.
 
-    learn: makes a model of a part of the data set. jobs: processes. progress: is told the share that is done.
+    learn: makes a model of a part of the data set. alternative: one with another basis, taken where it follows better.
+    jobs: processes. progress: is told the share that is done.
     """
     choices = {name: candidates for name, candidates in CHOICES.items() if name not in fixed}
-    steps = 2 + sum(len(candidates) for candidates in choices.values())
+    steps = 2 + sum(len(candidates) for candidates in choices.values()) + (alternative is not None)
     done = 0
 
     def tell() -> None:
@@ -167,6 +193,10 @@ def calibrate(
     tell()
     with workers(jobs) as run:
         calibration = Calibration(held_out, run, tell)
+        if alternative is not None:
+            otherwise = rehearsals(dataset, alternative.learn)
+            if len(otherwise) == len(held_out) and calibration.consider("basis", alternative.value, otherwise):
+                model, held_out = alternative.model, otherwise
         for name, candidates in choices.items():
             calibration.choose(name, candidates)
         calibration.choose_band()

@@ -18,11 +18,12 @@ from inphase.phase import PhaseModel
 from inphase.preprocess.coordinates import Coordinates
 from inphase.preprocess.scaling import Scaling
 from inphase.tempo import Tempo
-from inphase.training.calibrate import FEWEST
+from inphase.training.calibrate import FEWEST, Alternative
 from inphase.training.calibrate import calibrate as calibrated
 from inphase.training.discrepancy import leave_one_out
 from inphase.training.noise import both, regression_noise
 from inphase.training.reflex import learn_reflex
+from inphase.training.selection import select_basis
 from inphase.training.shrinkage import intensity
 from inphase.training.tempo import learn_phase
 from inphase.trajectory import Dataset
@@ -30,6 +31,7 @@ from inphase.weight_prior import WeightPrior
 
 STILL = 1e-12  # of a channel's size: it does not move
 DEFAULT_SIZE = 20  # basis functions a channel; what the demonstrations cannot support is left to the noise
+OTHER_SIZES = (6, 8, 10, 12, 15, 17, 20, 25, 30, 40)  # of which one is proposed, and taken if it follows better
 
 
 def fit(
@@ -49,10 +51,11 @@ def fit(
     """Learn how two partners move together.
 
     Everything is learned from the data set but what is named: a basis for all channels or by channel name or pattern
-    (what is left out keeps the default), the scaling of the features, the prior over weights, the observation noise in
-    scaled units (else that of the regression, Eq. 2.15, and that of leaving each demonstration out), the phase prior
-    (`inphase.learn_phase` makes one of another order, or periodic), how a partner's tempo may differ, and the shrinkage
-    of the prior between features ("between", "ledoit-wolf", "oas", or 0 … 1). Where there are four demonstrations or
+    (what is left out keeps the default: 20 functions, or as many as `select_basis` proposes where held-out
+    demonstrations are followed better with them), the scaling of the features, the prior over weights, the observation
+    noise in scaled units (else that of the regression, Eq. 2.15, and that of leaving each demonstration out), the phase
+    prior (`inphase.learn_phase` makes one of another order, or periodic), how a partner's tempo may differ, and the
+    shrinkage of the prior between features ("between", "ledoit-wolf", "oas", or 0 … 1). Where there are four demonstrations or
     more, the rest is calibrated: demonstrations are held out and played, which takes up to a minute;
     `calibrate=False` leaves that out. jobs: the processes that play. progress: is told the share that is done.
     Raises DataError for fewer than two demonstrations, no controlled channel, or a channel that never moves;
@@ -61,10 +64,10 @@ def fit(
     if not isinstance(dataset, Dataset):
         raise DataError(f"expected a Dataset, as inphase.load makes one, got {type(dataset).__name__}")
 
-    def learn(part: Dataset) -> Model:
-        return _learn(part, basis, scaling, prior, noise, phase, tempo, shrinkage)
+    def learner(default: Basis | None, known: Scaling | None) -> Callable[[Dataset], Model]:
+        return lambda part: _learn(part, basis, default, known, prior, noise, phase, tempo, shrinkage)
 
-    model = learn(dataset)
+    model = learner(None, scaling)(dataset)
     if not calibrate or len(dataset) < FEWEST:
         return model
     fixed = [
@@ -77,17 +80,28 @@ def fit(
         )
         if given
     ]
+    # The scale is the whole data set's, so that what is chosen for a part is right for all.
+    alternative, other = None, None if basis is not None or prior is not None else _proposed(dataset, model)
+    if other is not None:
+        learn_other = learner(other, model.scaling)
+        alternative = Alternative(f"{other.size} functions", learn_other(dataset), learn_other)
+    learn_fold = learner(None, model.scaling)
+    return calibrated(dataset, model, learn_fold, alternative=alternative, fixed=fixed, jobs=jobs, progress=progress)
 
-    def learn_fold(part: Dataset) -> Model:
-        # The scale is the whole data set's, so that what is chosen for a part is right for all.
-        return _learn(part, basis, model.scaling, prior, noise, phase, tempo, shrinkage)
 
-    return calibrated(dataset, model, learn_fold, fixed=fixed, jobs=jobs, progress=progress)
+def _proposed(dataset: Dataset, model: Model) -> Basis | None:
+    """The default with the number of functions that held-out demonstrations ask for; None where that is the default."""
+    periodic = model.phase.periodic
+    candidates = [Periodic(size) if periodic else Gaussian(size) for size in OTHER_SIZES]
+    selection = select_basis(dataset, candidates=candidates)
+    chosen = selection.candidates[selection.chosen()[0]]
+    return None if chosen.size == DEFAULT_SIZE else chosen
 
 
 def _learn(
     dataset: Dataset,
     basis: Basis | Mapping[str, Basis] | None,
+    default: Basis | None,
     scaling: Scaling | None,
     prior: WeightPrior | None,
     noise: Noise | None,
@@ -105,7 +119,7 @@ def _learn(
     scaling = scaling if scaling is not None else Scaling.learn(coordinates.groups, features)
     if len(scaling.low) != coordinates.count:
         raise OptionError(f"scaling: expected {coordinates.count} features, got {len(scaling.low)}")
-    layout = Layout(_bases(basis, dataset, coordinates, phase.periodic))
+    layout = Layout(_bases(basis, default, dataset, coordinates, phase.periodic))
     scaled = [scaling.scale(f) for f in features]
     times, phases = [d.times for d in dataset], [d.phases for d in dataset]
     weights, _ = fit_weights(layout, phases, scaled, names=coordinates.names)
@@ -170,10 +184,14 @@ def _spread(coordinates: Coordinates, features: Sequence[Float[np.ndarray, "_ F"
 
 
 def _bases(
-    basis: Basis | Mapping[str, Basis] | None, dataset: Dataset, coordinates: Coordinates, periodic: bool
+    basis: Basis | Mapping[str, Basis] | None,
+    default: Basis | None,
+    dataset: Dataset,
+    coordinates: Coordinates,
+    periodic: bool,
 ) -> tuple[Basis, ...]:
     """One basis a feature; that of a feature is the one of its (first) channel."""
-    default: Basis = Periodic(DEFAULT_SIZE) if periodic else Gaussian(DEFAULT_SIZE)
+    default = default or (Periodic(DEFAULT_SIZE) if periodic else Gaussian(DEFAULT_SIZE))
     if basis is None:
         basis = default
     for one in basis.values() if isinstance(basis, Mapping) else [basis]:
