@@ -51,6 +51,7 @@ PUBLIC = [
     "Session",
     "Status",
     "WeightPrior",
+    "assess",
     "basis",
     "fit",
     "learn_phase",

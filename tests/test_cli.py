@@ -360,16 +360,22 @@ def test_the_card_of_a_model_holds_its_figures(here, run):
 def test_the_card_of_recordings_holds_their_figures(here, run):
     card = json.loads(run("inspect", "good", *ROLES, "--json")[1])
     times, _ = episode(2)
-    assert card["episodes"][2] == {
+    found = {key: card["episodes"][2][key] for key in ("name", "samples", "duration", "rate", "missing")}
+    assert found == {
         "name": "episode_2",
         "samples": 30,
         "duration": pytest.approx(times[-1]),
         "rate": pytest.approx(29 / times[-1]),
+        "missing": {},
     }
     everything = np.concatenate([episode(i)[1] for i in range(4)])
     assert [c["low"] for c in card["channels"]] == everything.min(axis=0).tolist()
     assert [c["role"] for c in card["channels"]] == ["observed"] * 2 + ["controlled"] * 2
     assert [c["missing"] for c in card["channels"]] == [0.0] * 4
+    hand, robot = card["groups"]
+    assert (hand["group"], hand["channels"], robot["channels"]) == ("hand", list(NAMES[:2]), list(NAMES[2:]))
+    assert (hand["low"], hand["high"]) == (everything[:, :2].min(), everything[:, :2].max())
+    assert hand["span"] == pytest.approx(np.ptp(everything[:, :2], axis=0).max())
 
 
 def test_a_channel_that_was_never_seen_is_shown_as_such(here, run):

@@ -19,7 +19,7 @@ from inphase.preprocess import Coordinates, Scaling, trim
 from inphase.recording import Recording
 from inphase.result import Estimate, Response, Status
 from inphase.session import Session
-from inphase.training import fit, learn_phase, select_basis
+from inphase.training import assess, fit, learn_phase, select_basis
 from inphase.trajectory import Dataset, Demonstration
 from inphase.weight_prior import WeightPrior
 
@@ -49,6 +49,7 @@ __all__ = [
     "Session",
     "Status",
     "WeightPrior",
+    "assess",
     "basis",
     "fit",
     "learn_phase",

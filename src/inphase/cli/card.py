@@ -12,6 +12,7 @@ from rich.table import Table
 from inphase.cli.basis_text import show_basis
 from inphase.cli.console import counted
 from inphase.cli.evidence import describe_evidence, summary
+from inphase.cli.groups import groups_of_dataset, groups_of_model, print_groups
 from inphase.model import Model
 from inphase.trajectory import Dataset
 
@@ -60,6 +61,7 @@ def describe_model(model: Model) -> dict[str, Any]:
         "evidence": describe_evidence(model.evidence),
         "provenance": dict(model.provenance),
         "features": features,
+        "groups": groups_of_model(model),
     }
 
 
@@ -89,6 +91,8 @@ def print_model(console: Console, model: Model) -> None:
         for row in card["features"]
     ]
     console.print(_table(rows, numbers=("from", "to", "noise ±", "lasts [s]")), soft_wrap=False)
+    console.print()
+    print_groups(console, card["groups"])
 
 
 def _trust_in_words(trust: float) -> str:
@@ -118,6 +122,7 @@ def describe_dataset(dataset: Dataset) -> dict[str, Any]:
             }
             for c, column in zip(dataset.channels, everything.T, strict=True)
         ],
+        "groups": groups_of_dataset(dataset),
     }
 
 
@@ -144,6 +149,8 @@ def print_dataset(console: Console, dataset: Dataset) -> None:
         for row in card["channels"]
     ]
     console.print(_table(rows, numbers=("from", "to", "missing")), soft_wrap=False)
+    console.print()
+    print_groups(console, card["groups"])
 
 
 def _table(rows: Sequence[dict[str, str]], numbers: Sequence[str]) -> Table:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 import tyro
 
 from inphase.channels import Kind
-from inphase.cli.console import waiting
+from inphase.cli.console import Output, counted, waiting
 from inphase.filters import FILTERS
 from inphase.io import load
+from inphase.io.notes import NOTES, Note, notes_for
 from inphase.trajectory import Dataset
 
 Recordings = Annotated[
@@ -33,6 +35,9 @@ class Format:
     """the column of times [s]"""
     delimiter: Annotated[str, tyro.conf.arg(metavar="CHAR")] = ","
     """what stands between the columns of a CSV file; tab for a tabulator"""
+
+    ignore_notes: Annotated[bool, tyro.conf.arg(help_behavior_hint="")] = False
+    """take recordings as they are, whatever inphase-notes.json beside them says is left out or cut"""
 
     @property
     def separator(self) -> str:
@@ -66,7 +71,7 @@ class Columns(Format):
     def load(self, source: Sequence[str]) -> Dataset:
         """The data set of these files, folders or globs; raises DataError and ChannelError."""
         with waiting("reading recordings"):
-            return load(
+            dataset = load(
                 source,
                 self.observed,
                 self.controlled,
@@ -74,4 +79,26 @@ class Columns(Format):
                 delimiter=self.separator,
                 kinds=self.kinds,
                 trim=self.trim,
+                notes=not self.ignore_notes,
             )
+        decided = [f"{what} {dataset.provenance[what]}" for what in ("left out", "cut") if what in dataset.provenance]
+        if decided:
+            _tell(decided)
+        return dataset
+
+
+def noted(paths: Sequence[Path], format: Format) -> list[Note]:
+    """What the notes beside them say of these files, which is told; raises DataError for notes that cannot be used."""
+    if format.ignore_notes:
+        return [Note()] * len(paths)
+    notes = notes_for(paths)
+    counts = {"left out": sum(not n.use for n in notes), "cut": sum(n.use and n.cuts for n in notes)}
+    if any(counts.values()):
+        _tell(f"{what} {counted(count, 'episode')}" for what, count in counts.items() if count)
+    return notes
+
+
+def _tell(decided: Iterable[str]) -> None:
+    # On standard error: what is printed may be read by a machine.
+    said = "; ".join(decided)
+    Output(stderr=True).print(f"as {NOTES} says: {said} (--ignore-notes: take all as recorded)", style="dim")

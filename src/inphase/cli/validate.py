@@ -14,10 +14,11 @@ from rich.table import Table as PrintedTable
 
 from inphase.channels import make_channels
 from inphase.cli.console import Output, counted, waiting
-from inphase.cli.reading import AsJson, Columns, Recordings
+from inphase.cli.reading import AsJson, Columns, Recordings, noted
 from inphase.errors import DataError
 from inphase.io import Table, find_episodes, pick_roles, read_episode
 from inphase.io.files import episode_names
+from inphase.io.notes import NOTES, Note, as_noted
 from inphase.preprocess.checks import Finding, FindingKind, check
 from inphase.trajectory import guess_quaternions
 
@@ -37,20 +38,23 @@ def validate(
         json_: print the findings as JSON
     """
     paths = find_episodes(data)
+    notes = noted(paths, columns)
     with waiting(f"looking at {counted(len(paths), 'episode')}"):
-        channels, findings = _findings(paths, columns)
+        channels, findings = _findings(paths, notes, columns)
     findings.sort(key=lambda finding: finding.severity)
     if json_:
         json.dump([{**asdict(f), "kind": f.kind.value, "severity": f.severity} for f in findings], sys.stdout, indent=1)
         print()
     else:
-        _print(findings, len(paths), channels)
+        _print(findings, sum(note.use for note in notes), channels)
     return CANNOT_BE_USED if any(f.severity == "error" for f in findings) else 0
 
 
-def _findings(paths: Sequence[Path], columns: Columns) -> tuple[int, list[Finding]]:
+def _findings(paths: Sequence[Path], notes: Sequence[Note], columns: Columns) -> tuple[int, list[Finding]]:
     """How many channels were looked at, and what was found."""
-    tables, findings = _read(paths, columns)
+    tables, findings = _read(paths, notes, columns)
+    if not (tables or findings):
+        raise DataError(f"expected at least one episode to use, but {NOTES} leaves out all {len(paths)}")
     if not tables:
         raise DataError(findings[0].message)
     # The columns that most episodes have are what is expected: the first may be the odd one.
@@ -67,12 +71,16 @@ def _findings(paths: Sequence[Path], columns: Columns) -> tuple[int, list[Findin
     return len(names), findings + check(episodes, make_channels(names, [], kinds=kinds))
 
 
-def _read(paths: Sequence[Path], columns: Columns) -> tuple[list[tuple[str, Table]], list[Finding]]:
-    """The episodes that can be read, and a finding for each that cannot."""
+def _read(
+    paths: Sequence[Path], notes: Sequence[Note], columns: Columns
+) -> tuple[list[tuple[str, Table]], list[Finding]]:
+    """The episodes that are used and can be read, and a finding for each that cannot."""
     tables, findings = [], []
-    for name, path in zip(episode_names(paths), paths, strict=True):
+    for name, path, note in zip(episode_names(paths), paths, notes, strict=True):
         try:
-            tables.append((name, read_episode(path, time=columns.time, delimiter=columns.separator)))
+            if note.use:
+                table = read_episode(path, time=columns.time, delimiter=columns.separator)
+                tables.append((name, as_noted(table, note)))
         except DataError as error:
             findings.append(Finding(name, None, None, FindingKind.UNREADABLE, str(error)))
     return tables, findings

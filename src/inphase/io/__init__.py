@@ -4,24 +4,29 @@ Nothing else in the core opens a file.
 """
 
 from inphase.io.atomic import whole_file
+from inphase.io.edit_notes import edit_notes
 from inphase.io.files import find_episodes
 from inphase.io.intprim_analysis import read_analysis
 from inphase.io.intprim_analysis_writer import AnalysisHead, AnalysisStep, write_analysis
 from inphase.io.intprim_model import OldModel, read_bip
 from inphase.io.load import load, pick_roles, read_episode
+from inphase.io.notes import Note, read_notes
 from inphase.io.table import Table
 
 __all__ = [
     "AnalysisHead",
     "AnalysisStep",
+    "Note",
     "OldModel",
     "Table",
+    "edit_notes",
     "find_episodes",
     "load",
     "pick_roles",
     "read_analysis",
     "read_bip",
     "read_episode",
+    "read_notes",
     "whole_file",
     "write_analysis",
 ]

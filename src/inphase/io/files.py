@@ -62,7 +62,7 @@ def _expand(part: str) -> list[Path]:
 
 def _in_folder(folder: Path) -> list[Path]:
     try:
-        inside = _natural(folder.iterdir())
+        inside = natural(folder.iterdir())
     except OSError as error:
         raise DataError(f"{folder}: cannot be read: {error.strerror}") from None
     files = [path for path in inside if is_episode(path)]
@@ -70,7 +70,7 @@ def _in_folder(folder: Path) -> list[Path]:
         return files
     expected = f"{folder}: expected {' or '.join(SUFFIXES)} files in the folder, found "
     for depth in ("*", "*/*"):  # no deeper: the folder may be somebody's home
-        below = _natural(path for path in folder.glob(f"{depth}/*") if is_episode(path))
+        below = natural(path for path in folder.glob(f"{depth}/*") if is_episode(path))
         if below:
             folders = dict.fromkeys(path.parent.relative_to(folder).as_posix() for path in below)
             pattern = (folder / depth / f"*{below[0].suffix}").as_posix()
@@ -80,7 +80,7 @@ def _in_folder(folder: Path) -> list[Path]:
 
 def _that_fit(pattern: str) -> list[Path]:
     fitting = [Path(name) for name in glob.glob(pattern, recursive=True)]
-    files = _natural(path for path in fitting if is_episode(path))
+    files = natural(path for path in fitting if is_episode(path))
     if files:
         return files
     if not fitting:
@@ -89,12 +89,12 @@ def _that_fit(pattern: str) -> list[Path]:
     hint = ": try " + repr(f"{pattern.rstrip('/')}/*.csv") if folders else ""
     raise DataError(
         f"{pattern}: expected {' or '.join(SUFFIXES)} files to fit the pattern, "
-        f"got {'folders ' if folders else ''}{listing(_natural(fitting))}{hint}"
+        f"got {'folders ' if folders else ''}{listing(natural(fitting))}{hint}"
     )
 
 
-def _natural(paths: Iterable[Path]) -> list[Path]:
-    """Sorted by name, the numbers in a name compared as numbers."""
+def natural(paths: Iterable[Path]) -> list[Path]:
+    """Paths sorted by name, the numbers in a name compared as numbers."""
     # Splitting at the digits gives text and number in turn, so equal positions always hold the same type.
     return sorted(
         paths,

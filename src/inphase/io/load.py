@@ -12,6 +12,7 @@ from inphase.channels import match
 from inphase.errors import ChannelError, DataError, listing
 from inphase.io.csv import read_csv
 from inphase.io.files import SUFFIXES, Source, episode_names, find_episodes
+from inphase.io.notes import NOTES, Note, as_noted, notes_for
 from inphase.io.npz import read_npz
 from inphase.io.table import Table
 from inphase.preprocess.trim import trim as trim_idle
@@ -29,21 +30,28 @@ def load(
     kinds: Mapping[str, str] | None = None,
     groups: Mapping[str, str] | None = None,
     trim: bool = False,
+    notes: bool = True,
 ) -> Dataset:
     """The data set in a file, a folder, a glob pattern, or several of them: one demonstration a file, .csv or .npz.
 
     `observed` and `controlled` are names or patterns (`taker_?`) of the columns of each role; columns that fit neither
     are not loaded, and with no pattern at all every column is observed. The first file names the channels; others may
     hold them in another order, and more. `units`, `kinds` and `groups` go from a name or pattern to the value. `trim`
-    cuts the idle start and end off every demonstration. Raises DataError that names the file, and ChannelError.
+    cuts the idle start and end off every demonstration. What `inphase-notes.json` beside the files says is left out or
+    cut, unless `notes` is False; the provenance tells. Raises DataError that names the file, and ChannelError.
     """
     paths = find_episodes(source)
-    first = read_episode(paths[0], time=time, delimiter=delimiter)
+    names = episode_names(paths)
+    noted = notes_for(paths) if notes else [Note()] * len(paths)
+    used = [i for i, note in enumerate(noted) if note.use]
+    if not used:
+        raise DataError(f"expected at least one episode to use, but {NOTES} leaves out all {len(paths)}")
+    first = read_episode(paths[used[0]], time=time, delimiter=delimiter)
     roles = pick_roles(first, observed, controlled)
     demonstrations = []
-    for i, path in enumerate(paths):
-        table = first if i == 0 else read_episode(path, time=time, delimiter=delimiter)
-        demonstrations.append(_demonstration(table, [*roles[0], *roles[1]]))
+    for i in used:
+        table = first if i == used[0] else read_episode(paths[i], time=time, delimiter=delimiter)
+        demonstrations.append(_demonstration(as_noted(table, noted[i]), [*roles[0], *roles[1]]))
     dataset = Dataset.from_arrays(
         [demonstration.times for demonstration in demonstrations],
         [demonstration.values for demonstration in demonstrations],
@@ -51,8 +59,8 @@ def load(
         units=units,
         kinds=kinds,
         groups=groups,
-        names=episode_names(paths),
-        provenance={"source": _as_given(source), "episodes": str(len(paths))},
+        names=[names[i] for i in used],
+        provenance={"source": _as_given(source), "episodes": str(len(used)), **_decided(names, noted)},
     )
     return trim_idle(dataset) if trim else dataset
 
@@ -98,6 +106,22 @@ def _demonstration(table: Table, names: Sequence[str]) -> Demonstration:
             f"in channel {names[column]!r} at {table.times[sample]:.10g} s"
         )
     return Demonstration(table.times, values, table.name)
+
+
+def _decided(names: Sequence[str], noted: Sequence[Note]) -> dict[str, str]:
+    """What was left out and what was cut, in words; nothing where that is nothing."""
+    out = [
+        f"{name} ({note.reason})" if note.reason else name
+        for name, note in zip(names, noted, strict=True)
+        if not note.use
+    ]
+    cut = [f"{name} ({_span(note)})" for name, note in zip(names, noted, strict=True) if note.use and note.cuts]
+    return {what: f"{len(some)}: {listing(some)}" for what, some in (("left out", out), ("cut", cut)) if some}
+
+
+def _span(note: Note) -> str:
+    start, end = (None if time is None else f"{time:.10g} s" for time in (note.start, note.end))
+    return " ".join(part for part in (start and f"from {start}", end and f"until {end}") if part)
 
 
 def _as_given(source: Source) -> str:

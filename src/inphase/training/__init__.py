@@ -3,7 +3,18 @@
 from inphase.training.discrepancy import leave_one_out
 from inphase.training.fit import fit
 from inphase.training.noise import regression_noise
+from inphase.training.quality import EpisodeQuality, Quality, assess
 from inphase.training.selection import BasisSelection, select_basis
 from inphase.training.tempo import learn_phase
 
-__all__ = ["BasisSelection", "fit", "learn_phase", "leave_one_out", "regression_noise", "select_basis"]
+__all__ = [
+    "BasisSelection",
+    "EpisodeQuality",
+    "Quality",
+    "assess",
+    "fit",
+    "learn_phase",
+    "leave_one_out",
+    "regression_noise",
+    "select_basis",
+]
