@@ -858,7 +858,7 @@ PAGE = Path(__file__).parents[1] / "docs" / "data.md"
 def test_the_page_on_data_is_true(tmp_path, monkeypatch, run):
     """Its snippets run, on recordings with the columns that it shows; its tables name every kind and finding."""
     text = PAGE.read_text(encoding="utf-8")
-    blocks = dict.fromkeys(("csv", "python"), "")
+    blocks = dict.fromkeys(("csv", "python", "console", "json"), "")
     for language, block in re.findall(r"```(\w+)\n(.*?)```", text, flags=re.DOTALL):
         blocks[language] += block
     example = tmp_path / "example.csv"

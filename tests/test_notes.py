@@ -20,6 +20,7 @@ from inphase.io.csv import write_csv
 from inphase.io.notes import NOTES, write_notes
 
 NAMES = ("hand_x", "hand_y", "robot_x", "robot_y")
+BOTH = ["data/episode_001.csv", "data/episode_002.csv"]
 ROLES = ["--observed", "hand_?", "--controlled", "robot_?"]
 
 
@@ -222,6 +223,16 @@ def test_the_file_reads_as_the_page_has_it(here):
     assert not Path("data", NOTES).exists()
 
 
+def test_what_the_page_shows_is_read_and_written_back(tmp_path):
+    page = (Path(__file__).parents[1] / "docs" / "data.md").read_text(encoding="utf-8")
+    (shown,) = re.findall(r"```json\n(.*?)```", page, flags=re.DOTALL)
+    for name in json.loads(shown)["episodes"]:
+        (tmp_path / f"{name}.csv").touch()
+    (tmp_path / NOTES).write_text(shown)
+    write_notes(tmp_path, read_notes(tmp_path))
+    assert json.loads((tmp_path / NOTES).read_text()) == json.loads(shown)
+
+
 @pytest.mark.parametrize(
     ("edit", "words"),
     [
@@ -271,7 +282,7 @@ def test_what_is_noted_on_the_command_line_holds_for_every_command(here, run, mo
     for command in (
         ["inspect", "data"],
         ["fit", "data", *ROLES, "--quick", "-o", "a.inphase"],
-        ["replay", "a.inphase", "data", "--filter", "bip"],
+        ["replay", "a.inphase", *BOTH, "--filter", "bip"],
     ):
         assert said in run(*command)[2]
     assert inphase.Model.load("a.inphase").provenance["left out"] == "1: episode_001 (dropped = the baton)"
@@ -281,7 +292,7 @@ def test_what_is_noted_on_the_command_line_holds_for_every_command(here, run, mo
     for command in (
         ["inspect", "data", "--json"],
         ["validate", "data"],
-        ["replay", "a.inphase", "data", "--filter", "bip"],
+        ["replay", "a.inphase", *BOTH, "--filter", "bip"],
     ):
         assert run(*command, "--ignore-notes")[2] == ""
     card = json.loads(run("inspect", "data", "--json")[1])
