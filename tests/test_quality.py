@@ -139,7 +139,7 @@ def test_gaussian_curves_are_marked_no_more_often_than_stated(count, directions,
         spread = rng.standard_normal((count, directions)) @ rng.standard_normal((directions, 60))
         found = left_out(spread + 0.2 * rng.standard_normal((count, 60)), np.full(60, 0.05), 0.1)
         over += bool(scores(found.distance, 60).max() > threshold(found.variances, 0.1, 60))
-    assert over <= ERROR_RATE * drawn
+    assert over <= ERROR_RATE * drawn + 2 * np.sqrt(ERROR_RATE * drawn)  # which is what chance makes of the count
 
 
 def test_who_comes_late_is_told_from_who_does_otherwise():

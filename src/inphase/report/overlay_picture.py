@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from os import PathLike
 from typing import TYPE_CHECKING
 
@@ -18,8 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST = 12  # channels; more cannot be told apart
-ACROSS = 4
+MOST = 12  # channels, in three rows of four; more cannot be told apart
 COLOURS = ("#d1603d", "#0b6e99", "#e9a23b", "#6d5aa8", "#3f8f5f", "#8e3b46")  # outliers beyond share the last
 USUAL = "#9aa3ad"
 
@@ -45,7 +45,7 @@ def make_figure(dataset: Dataset, quality: Quality) -> Figure:
     coordinates = Coordinates.learn(dataset.channels, [d.values for d in dataset])
     features = [coordinates.from_channels(d.values) for d in dataset]
     shown = _shown(coordinates, features, quality)
-    columns = min(ACROSS, len(shown))
+    columns = math.isqrt(len(shown) - 1) + 1  # as many as rows, or one more
     rows = -(-len(shown) // columns)
     figure = Figure(figsize=(max(6.5, 3.3 * columns), 2.3 * rows + 0.9), layout="constrained")
     panels = figure.subplots(rows, columns, sharex=True, squeeze=False)
