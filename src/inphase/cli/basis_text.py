@@ -13,7 +13,7 @@ def parse_basis(text: str) -> Basis:
     family, *numbers = text.split(":")
     if family not in FAMILIES:
         raise OptionError(f"--basis: unknown family of basis functions {family!r}; one of {listing(FAMILIES)}")
-    names = list(inspect.signature(FAMILIES[family]).parameters)
+    names = [name for name in inspect.signature(FAMILIES[family]).parameters if name != "centres"]
     try:
         values = [int(numbers[0]), *map(float, numbers[1:])]
         parameters = dict(zip(names[: len(values)], values, strict=True))

@@ -55,8 +55,8 @@ def fit(
     demonstrations are followed better with them), the scaling of the features, the prior over weights, the observation
     noise in scaled units (else that of the regression, Eq. 2.15, and that of leaving each demonstration out), the phase
     prior (`inphase.learn_phase` makes one of another order, or periodic), how a partner's tempo may differ, and the
-    shrinkage of the prior between features ("between", "ledoit-wolf", "oas", or 0 … 1). Where there are four demonstrations or
-    more, the rest is calibrated: demonstrations are held out and played, which takes up to a minute;
+    shrinkage of the prior between features ("between", "ledoit-wolf", "oas", or 0 … 1). Where there are four
+    demonstrations or more, the rest is calibrated: demonstrations are held out and played, which takes up to a minute;
     `calibrate=False` leaves that out. jobs: the processes that play. progress: is told the share that is done.
     Raises DataError for fewer than two demonstrations, no controlled channel, or a channel that never moves;
     ChannelError for a pattern that fits nothing; OptionError for parts that do not fit each other.
