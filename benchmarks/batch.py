@@ -12,7 +12,7 @@ from timing import duration
 
 import inphase
 from inphase.filters import make
-from inphase.training.workers import workers
+from inphase.workers import workers
 
 SIZES = {"2 × 8": Extent(2, 8, 100, 62), "12 × 7": Extent(12, 7, 100, 62), "62 × 9": Extent(62, 9, 100, 62)}
 FILTERS = ("ebip", "rbpf")
@@ -43,8 +43,8 @@ def measure(title: str, extent: Extent, name: str, batches: tuple[int, ...], rng
     options = {"members" if name == "ebip" else "particles": extent.members}
     stream = np.array([observation.values for observation in observations(model, SAMPLES, rng)])
     rows = []
-    with workers(PROCESSES) as run:
-        run(play, [(model, name, options, stream[:2], 0)] * 2 * PROCESSES)  # they start, and import
+    with workers(PROCESSES) as team:
+        team.run(play, [(model, name, options, stream[:2], 0)] * 2 * PROCESSES)  # they start, and import
         for batch in batches:
             tasks = [(model, name, options, stream, seed) for seed in range(batch)]
             taken = []
@@ -52,7 +52,7 @@ def measure(title: str, extent: Extent, name: str, batches: tuple[int, ...], rng
                 begun = time.perf_counter()
                 alone = [play(*task) for task in tasks]
                 middle = time.perf_counter()
-                shared = run(play, tasks)
+                shared = team.run(play, tasks)
                 taken.append((middle - begun, time.perf_counter() - middle, sum(alone), sum(shared)))
             one, two, one_work, two_work = np.min(taken, axis=0).tolist()
             stacked = ebip_stacked if name == "ebip" else rbpf_stacked

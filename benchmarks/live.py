@@ -29,7 +29,7 @@ import inphase
 from inphase.errors import OptionError
 from inphase.filters import FILTERS
 from inphase.io.atomic import check_target, whole_file
-from inphase.training.workers import workers
+from inphase.workers import workers
 
 SPIN = 0.001  # [s] before its time, a cycle is awaited by looking at the clock: sleep comes back late
 MEMBERS = {"ebip": "members", "particle": "particles", "rbpf": "particles"}

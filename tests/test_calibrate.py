@@ -19,7 +19,7 @@ from inphase.training import rehearsal
 from inphase.training.calibrate import CHOICES, Calibration, Candidate
 from inphase.training.fit import _proposed as proposed
 from inphase.training.rehearsal import CONDITIONS, Rehearsal, play, rehearsals, relative
-from inphase.training.workers import workers
+from inphase.workers import workers
 
 SAMPLES, CHANNELS = 40, 2
 
@@ -234,7 +234,7 @@ def test_only_a_basis_that_nobody_named_is_chosen(
 def test_two_processes_find_what_one_finds(model: inphase.Model, demos: inphase.Dataset) -> None:
     tasks = [(model, CONDITIONS["as recorded"](demo, 2, 0.3)) for demo in demos.subset([0, 1])]
     with workers(1) as one, workers(2) as two:
-        for here, there in zip(one(play, tasks), two(play, tasks), strict=True):
+        for here, there in zip(one.run(play, tasks), two.run(play, tasks), strict=True):
             assert_array_equal(here.now, there.now)
             assert_array_equal(here.std, there.std)
 

@@ -208,8 +208,16 @@ def test_the_library_is_asked_for_what_was_wanted(run, asked, here):
     words = ["--filters", "bip", "ebip", "--folds", 3, "--conditions", "pause 2 s", "--seed", 7, "--jobs", 5]
     assert run("reach", *ROLES, *words) == (130, "", "inphase: stopped\n")
     assert asked.pop("progress") is None
+    assert asked.pop("keep") is not None
     assert asked.pop("fit").keywords == {"calibrate": True}
-    assert asked == {"filters": ("bip", "ebip"), "folds": 3, "conditions": ("pause 2 s",), "seed": 7, "jobs": 5}
+    assert asked == {
+        "filters": ("bip", "ebip"),
+        "folds": 3,
+        "conditions": ("pause 2 s",),
+        "seed": 7,
+        "jobs": 5,
+        "known": [],
+    }
 
 
 def test_who_names_nothing_gets_the_recommended_filter_and_all_conditions(run, asked, here):

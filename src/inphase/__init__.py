@@ -9,6 +9,7 @@ from inphase.errors import (
     ModelFileError,
     ObservationError,
     OptionError,
+    WorkerError,
 )
 from inphase.io import load
 from inphase.model import Model
@@ -49,6 +50,7 @@ __all__ = [
     "Session",
     "Status",
     "WeightPrior",
+    "WorkerError",
     "assess",
     "basis",
     "fit",

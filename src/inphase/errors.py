@@ -25,6 +25,10 @@ class ObservationError(InphaseError, ValueError):
     """A live sample has the wrong shape, an unknown channel or a time that runs backwards."""
 
 
+class WorkerError(InphaseError):
+    """Processes that worked for this one, or a cluster of them, are gone."""
+
+
 class ModelFileError(InphaseError):
     """A model file is not one, is damaged, or was written by a newer version."""
 

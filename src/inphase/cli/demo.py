@@ -56,7 +56,7 @@ def demo(
         dataset = load(output / shape, observed=["x"], controlled=["y"], units={"*": "mm"})
         last = dataset[-1]
         with working(f"{shape}: learning from {len(dataset) - 1} demonstrations") as progress:
-            model = fit(dataset.without(-1), calibrate=calibrate, jobs=processes(None), progress=progress)
+            model = fit(dataset.without(-1), calibrate=calibrate, jobs=processes(), progress=progress)
         model.save(output / f"{shape}.inphase")
         console.print(f"{shape}: learned from {len(dataset) - 1} demonstrations, following the one left out")
         if calibrate:

@@ -13,10 +13,11 @@ import tyro
 
 from inphase.cli.accuracy import LEGEND, accuracy_series, describe_evaluation, print_evaluation
 from inphase.cli.console import Output, counted, working
-from inphase.cli.jobs import Jobs, processes
+from inphase.cli.jobs import Jobs
 from inphase.cli.reading import AsJson, Columns, Recordings
-from inphase.errors import DataError, OptionError, listing
-from inphase.evaluation import CONDITIONS
+from inphase.cli.unfinished import describe_settings, read_rows
+from inphase.errors import DataError, OptionError, WorkerError, listing
+from inphase.evaluation import BASELINES, CONDITIONS, Evaluation, Row
 from inphase.evaluation import evaluate as cross_validate
 from inphase.evaluation.protocol import FOLDS
 from inphase.filters import FILTERS, RECOMMENDED
@@ -34,13 +35,14 @@ File = Annotated[Path | None, tyro.conf.arg(help_behavior_hint="")]
 def evaluate(
     data: Recordings,
     columns: tyro.conf.OmitArgPrefixes[Columns],
+    jobs: tyro.conf.OmitArgPrefixes[Jobs],
     filters: FilterNames = (RECOMMENDED,),
     folds: int = FOLDS,
     conditions: ConditionNames = tuple(CONDITIONS),
     seed: int = 0,
     quick: Annotated[bool, tyro.conf.arg(help_behavior_hint="")] = False,
-    jobs: Jobs = None,
     output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], help_behavior_hint="")] = None,
+    resume: Annotated[bool, tyro.conf.arg(help_behavior_hint="")] = False,
     picture: File = None,
     json_: AsJson = False,
 ) -> int:
@@ -51,13 +53,14 @@ def evaluate(
     Args:
         data: files, folders or globs of CSV or npz recordings, one episode a file; of several folders each is a task
         columns: what the columns are
+        jobs: who works
         filters: how phase and weights are inferred, one or more; none for the baselines alone
         folds: every so many-th episode is held out at a time
         conditions: under which held-out episodes are shown: other tempos, a pause, a partner out of sight
         seed: of the filters' random numbers
         quick: learn without holding anything out once more, as `inphase fit --quick` does: a second instead of a minute
-        jobs: processes that work side by side; otherwise one a processor
-        output: write all figures, every episode's too, into this JSON file
+        output: write all figures, every episode's too, into this JSON file; after Ctrl-C those that are there
+        resume: go on with what --output holds, after Ctrl-C or for more filters or conditions
         picture: draw errors and coverage into this file (.png, .svg or .pdf)
         json_: print all figures as JSON
     """
@@ -66,34 +69,54 @@ def evaluate(
     for path in (output, picture):
         if path is not None:
             check_target(path)
-    side_by_side = processes(jobs)
+    if resume and output is None:
+        raise OptionError("--resume: expected --output, the file to go on with, got none")
+    jobs.check()
     tasks = _read(data, columns)
-    with working(f"evaluating with {counted(sum(map(len, tasks.values())), 'episode')}") as progress:
-        evaluation = cross_validate(
-            tasks,
-            filters,
-            folds=folds,
-            conditions=conditions,
-            seed=seed,
-            fit=partial(fit, calibrate=not quick),
-            jobs=side_by_side,
-            progress=progress,
-        )
-    found = {"folds": folds, "seed": seed, **describe_evaluation(evaluation)}
-    console = Output(quiet=json_)
-    print_evaluation(console, evaluation)
-    console.print(LEGEND, style="dim")
-    if output is not None:
-        with whole_file(output) as temporary:
-            temporary.write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        console.print(f"wrote {output}")
+    settings = describe_settings(tasks, folds, seed, quick)
+    known = read_rows(output, settings) if resume and output is not None else []
+    rows: list[Row] = []
+    count, console = sum(map(len, tasks.values())), Output(quiet=json_)
+
+    def tell(evaluation: Evaluation, missing: int) -> None:
+        found = {**settings, "partial": missing > 0, "missing": missing, **describe_evaluation(evaluation)}
+        print_evaluation(console, evaluation)
+        console.print(LEGEND, style="dim")
+        if missing:
+            console.print(f"partial: {missing} of {missing + len(evaluation.rows)} scores are missing")
+        if output is not None:
+            with whole_file(output) as temporary:
+                temporary.write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+            console.print(f"wrote {output}" + ("; the same command with --resume goes on" if missing else ""))
+        if json_:
+            json.dump(found, sys.stdout, indent=1, allow_nan=False)
+            print()
+
+    try:
+        with jobs.opened() as workers, working(f"evaluating with {counted(count, 'episode')}") as progress:
+            evaluation = cross_validate(
+                tasks,
+                filters,
+                folds=folds,
+                conditions=conditions,
+                seed=seed,
+                fit=partial(fit, calibrate=not quick),
+                known=known,
+                keep=rows.extend,
+                progress=progress,
+                **workers,
+            )
+    except (KeyboardInterrupt, WorkerError):
+        if rows:
+            wanted = [*tasks], [*filters, *BASELINES], [*conditions]
+            rows.sort(key=lambda row: [*map(list.index, wanted, (row.task, row.predictor, row.condition)), row.fold])
+            tell(Evaluation(tuple(rows)), count * len({*wanted[1]}) * len({*conditions}) - len(rows))
+        raise
+    tell(evaluation, 0)
     if picture is not None:
         title = evaluation.tasks[0] if len(evaluation.tasks) == 1 else f"mean of {len(evaluation.tasks)} tasks"
         draw_accuracy(picture, title, evaluation.conditions, accuracy_series(evaluation))
         console.print(f"wrote {picture}")
-    if json_:
-        json.dump(found, sys.stdout, indent=1, allow_nan=False)
-        print()
     return 0
 
 

@@ -13,7 +13,7 @@ from inphase.cli.basis_text import parse_basis
 from inphase.cli.card import describe_model, print_model
 from inphase.cli.console import Output, counted, working
 from inphase.cli.evidence import print_evidence
-from inphase.cli.jobs import Jobs, processes
+from inphase.cli.jobs import Jobs
 from inphase.cli.reading import AsJson, Columns, Recordings
 from inphase.errors import OptionError, listing
 from inphase.io import find_episodes, read_episode
@@ -27,12 +27,12 @@ Flag = Annotated[bool, tyro.conf.arg(help_behavior_hint="")]
 def fit(
     data: Recordings,
     columns: tyro.conf.OmitArgPrefixes[Columns],
+    jobs: tyro.conf.OmitArgPrefixes[Jobs],
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("model.inphase"),
     basis: Annotated[str | None, tyro.conf.arg(metavar="FAMILY:SIZE", help_behavior_hint="")] = None,
     order: int = 1,
     periodic: Flag = False,
     quick: Flag = False,
-    jobs: Jobs = None,
     report: Flag = False,
     json_: AsJson = False,
 ) -> int:
@@ -43,17 +43,17 @@ def fit(
     Args:
         data: files, folders or globs of CSV or npz recordings, one episode a file
         columns: what the columns are
+        jobs: who plays held-out recordings
         output: the model file to write
         basis: basis functions of every channel, such as gaussian:15; otherwise the library's choice
         order: of the phase: 0 alone, 1 with tempo, 2 with a tempo that accelerates
         periodic: an episode is one cycle of an interaction that goes on and on
         quick: hold nothing out: a second instead of up to a minute, but a model that nobody tested
-        jobs: processes that play held-out recordings side by side; otherwise one a processor
         report: print all that was tried, and how well each followed the held-out recordings
         json_: print the model's card, and the report, as JSON
     """
     check_target(output)
-    side_by_side = processes(jobs)
+    jobs.check()
     chosen = parse_basis(basis) if basis is not None else None
     if not (columns.observed and columns.controlled):
         first = read_episode(find_episodes(data)[0], time=columns.time, delimiter=columns.separator)
@@ -64,14 +64,15 @@ def fit(
     dataset = columns.load(data)
     # The usual phase is learned anew for every model that some demonstrations are held out from.
     phase = None if order == 1 and not periodic else learn_phase(dataset, order, periodic)
-    with working(f"learning from {counted(len(dataset), 'demonstration')}") as progress:
+    doing = f"learning from {counted(len(dataset), 'demonstration')}"
+    with jobs.opened() as workers, working(doing) as progress:
         model = fit_model(
             dataset,
             basis=chosen,
             phase=phase,
             calibrate=not quick,
-            jobs=side_by_side,
             progress=progress,
+            **workers,
         )
     model.save(output)
     if json_:

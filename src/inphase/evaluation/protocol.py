@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections import deque
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -20,14 +20,13 @@ from inphase.filters import FILTERS, RECOMMENDED
 from inphase.model import Model
 from inphase.training import fit as learn_model
 from inphase.trajectory import Dataset
-
-Part = TypeVar("Part")
+from inphase.workers import workers
 
 FOLDS = 4
 FEWEST_SHOWN = 2  # demonstrations that a model is learned from
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Split:
     """One fold of one task: what is learned from, and what was held out."""
 
@@ -35,6 +34,16 @@ class Split:
     fold: int
     train: Dataset
     test: Dataset
+
+
+@dataclass(frozen=True)
+class Part:
+    """What is scored at a time: one predictor on what was held out in one fold, under one condition."""
+
+    task: str
+    fold: int
+    predictor: str
+    condition: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +64,9 @@ def evaluate(
     fit: Callable[[Dataset], Model] = learn_model,
     others: Mapping[str, Learner] = BASELINES,
     jobs: int = 1,
+    cluster: str | None = None,
+    known: Sequence[Row] = (),
+    keep: Callable[[Sequence[Row]], object] | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Evaluation:
     """How well filters, and what else is named, follow interactions that they have not seen.
@@ -62,30 +74,48 @@ def evaluate(
     data: one task, or several by name. Episode i is held out in fold i % folds; what is learned from the others by
     `fit` and by `others` (the baselines) is shown the observed channels of each held-out episode, sample by sample,
     under each of the conditions, with the same seed. jobs: so many processes; the rows are the same for any number.
-    progress: is told the share that is done. Raises OptionError for unknown names, and DataError where there are too
-    few episodes.
+    cluster: the address of a dask scheduler (tcp://host:port) whose workers do it instead. known: rows of the same
+    evaluation, interrupted, or of a smaller one; what they hold is not done again. keep: is told rows as they are
+    found, the known ones first, so that an interrupt loses none. progress: is told the share that is done.
+    Raises OptionError for unknown names and a cluster that does not answer, DataError where there are too few episodes,
+    WorkerError where workers are lost for good.
     """
     tasks = {"data": data} if isinstance(data, Dataset) else dict(data)
     conditions, filters = tuple(dict.fromkeys(conditions)), tuple(dict.fromkeys(filters))
-    _check(tasks, filters, others, folds, conditions, jobs)
-    splits = [split for task, dataset in tasks.items() for split in _splits(task, dataset, folds)]
+    _check(tasks, filters, others, folds, conditions)
     names = [*filters, *others]
-    total = len(splits) * (1 + len(names) * len(conditions))
-
-    from joblib import Parallel, delayed  # type: ignore[import-untyped]
-
-    # Arrays go to the processes as they are: no files are left anywhere.
-    with Parallel(n_jobs=jobs, return_as="generator", max_nbytes=None) as work:
-        learning = work(delayed(_learn)(split, filters, fit, others, seed) for split in splits)
-        learned = list(_told(learning, 0, total, progress))
-        playing = work(
-            delayed(_score)(split.task, split.fold, split.test, condition, name, found.predictors[name], found.spread)
-            for split, found in zip(splits, learned, strict=True)
-            for name in names
-            for condition in conditions
-        )
-        rows = [row for some in _told(playing, len(splits), total, progress) for row in some]
-    return Evaluation(tuple(rows))
+    splits = [split for task, dataset in tasks.items() for split in _splits(task, dataset, folds)]
+    parts = {
+        split: [Part(split.task, split.fold, name, condition) for name in names for condition in conditions]
+        for split in splits
+    }
+    found = {part: rows for split in splits for part, rows in _known(known, split).items() if part in parts[split]}
+    if keep is not None:
+        for rows in found.values():
+            keep(rows)
+    to_score = {split: [part for part in parts[split] if part not in found] for split in splits}
+    waiting: deque[tuple[Split | Part, Callable[[], Learned | list[Row]]]] = deque(
+        (split, partial(_learn, split, {part.predictor for part in missing}, fit, others, seed))
+        for split, missing in to_score.items()
+        if missing
+    )
+    total = len(waiting) + sum(map(len, to_score.values()))
+    with workers(jobs, cluster) as team:
+        for done, (label, result) in enumerate(team.as_done(waiting), 1):
+            if isinstance(label, Split):
+                # What was learned is scored before more is learned: less waits, and an interrupt finds finished rows.
+                scoring = [
+                    (part, partial(_score, part, label.test, result.predictors[part.predictor], result.spread))
+                    for part in to_score[label]
+                ]
+                waiting.extendleft(reversed(scoring))
+            else:
+                found[label] = result
+                if keep is not None:
+                    keep(result)
+            if progress is not None:
+                progress(done / total)
+    return Evaluation(tuple(row for split in splits for part in parts[split] for row in found[part]))
 
 
 def _check(
@@ -94,7 +124,6 @@ def _check(
     others: Mapping[str, Learner],
     folds: int,
     conditions: Sequence[str],
-    jobs: int,
 ) -> None:
     for what, names, valid in (("filter", filters, FILTERS), ("condition", conditions, CONDITIONS)):
         for name in names:
@@ -102,9 +131,8 @@ def _check(
                 raise OptionError(f"unknown {what} {name!r}; one of {listing(map(repr, valid))}")
     if not (filters or others) or not conditions:
         raise OptionError("expected at least one filter or baseline and one condition, got none")
-    for what, number, least in (("folds", folds, 2), ("jobs", jobs, 1)):
-        if not (isinstance(number, (int, np.integer)) and number >= least):
-            raise OptionError(f"{what}: expected a whole number of at least {least}, got {number!r}")
+    if not (isinstance(folds, (int, np.integer)) and folds >= 2):
+        raise OptionError(f"folds: expected a whole number of at least 2, got {folds!r}")
     if not tasks:
         raise DataError("expected at least one data set, got none")
     for task, dataset in tasks.items():
@@ -131,56 +159,37 @@ def _splits(task: str, dataset: Dataset, folds: int) -> Iterator[Split]:
         yield Split(task, fold, train, dataset.subset(everything[fold::folds]))
 
 
+def _known(rows: Sequence[Row], split: Split) -> dict[Part, list[Row]]:
+    """The parts of a split whose every episode is among the rows."""
+    found: dict[Part, list[Row]] = {}
+    for row in rows:
+        if (row.task, row.fold) == (split.task, split.fold):
+            found.setdefault(Part(row.task, row.fold, row.predictor, row.condition), []).append(row)
+    episodes = [demonstration.name for demonstration in split.test]
+    return {part: some for part, some in found.items() if [row.episode for row in some] == episodes}
+
+
 def _learn(
     split: Split,
-    filters: Sequence[str],
+    names: Collection[str],
     fit: Callable[[Dataset], Model],
     others: Mapping[str, Learner],
     seed: int,
 ) -> Learned:
-    with _one_thread():
-        try:
-            spread = Partners.learn(split.train).spread(split.train)
-            predictors: dict[str, Predictor] = {}
-            if filters:
-                model = fit(split.train)
-                predictors |= {name: Filtered(model, name, seed) for name in filters}
-            predictors |= {name: learn(split.train) for name, learn in others.items()}
-        except DataError as error:
-            raise DataError(f"{split.task}: {error}") from None
+    try:
+        spread = Partners.learn(split.train).spread(split.train)
+        predictors: dict[str, Predictor] = {name: others[name](split.train) for name in names if name in others}
+        if len(predictors) < len(names):
+            model = fit(split.train)
+            predictors |= {name: Filtered(model, name, seed) for name in names if name not in others}
+    except DataError as error:
+        raise DataError(f"{split.task}: {error}") from None
     return Learned(spread, predictors)
 
 
-def _score(
-    task: str,
-    fold: int,
-    test: Dataset,
-    condition: str,
-    name: str,
-    predictor: Predictor,
-    spread: Float[np.ndarray, " Dc"],
-) -> list[Row]:
+def _score(part: Part, test: Dataset, predictor: Predictor, spread: Float[np.ndarray, " Dc"]) -> list[Row]:
     rows = []
-    with _one_thread():
-        for demonstration in test:
-            errors = play(predictor, test, warp(demonstration, test.channels, condition), spread)
-            rows.append(Row.of(task, name, condition, fold, demonstration.name, errors))
+    for demonstration in test:
+        errors = play(predictor, test, warp(demonstration, test.channels, part.condition), spread)
+        rows.append(Row.of(part.task, part.predictor, part.condition, part.fold, demonstration.name, errors))
     return rows
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """BLAS with one thread: more would be in each other's way, and might add up in another order."""
-    import scipy.linalg  # noqa: F401 - it brings a BLAS of its own, which can be limited once it is there
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(limits=1):
-        yield
-
-
-def _told(parts: Iterable[Part], before: int, total: int, progress: Callable[[float], object] | None) -> Iterator[Part]:
-    """The parts as they come, each told of."""
-    for done, part in enumerate(parts, before + 1):
-        if progress is not None:
-            progress(done / total)
-        yield part

@@ -19,8 +19,8 @@ from inphase.model import Model
 from inphase.noise import Noise
 from inphase.training.rehearsal import CONDITIONS, Rehearsal, by_the_clock, play, rehearsals, relative, scores
 from inphase.training.shrinkage import intensity
-from inphase.training.workers import Run, workers
 from inphase.trajectory import Dataset
+from inphase.workers import Run, workers
 
 FEWEST = 4  # demonstrations: without one of three, too little is left to judge by
 INSIDE = 0.9  # of the readings, inside the band of 90 %
@@ -170,12 +170,13 @@ def calibrate(
     alternative: Alternative | None = None,
     fixed: Sequence[str] = (),
     jobs: int = 1,
+    cluster: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Model:
     """The model with everything chosen that is not in `fixed`, and the evidence.
 
     learn: makes a model of a part of the data set. alternative: one with another basis, taken where it follows better.
-    jobs: processes. progress: is told the share that is done.
+    jobs, cluster: who plays (see `inphase.workers`). progress: is told the share that is done.
     """
     choices = {name: candidates for name, candidates in CHOICES.items() if name not in fixed}
     steps = 2 + sum(len(candidates) for candidates in choices.values()) + (alternative is not None)
@@ -191,8 +192,8 @@ def calibrate(
     if len(held_out) < FEWEST - 1:
         return model
     tell()
-    with workers(jobs) as run:
-        calibration = Calibration(held_out, run, tell)
+    with workers(jobs, cluster) as team:
+        calibration = Calibration(held_out, team.run, tell)
         if alternative is not None:
             otherwise = rehearsals(dataset, alternative.learn)
             if len(otherwise) == len(held_out) and calibration.consider("basis", alternative.value, otherwise):

@@ -28,6 +28,7 @@ from inphase.training.shrinkage import intensity
 from inphase.training.tempo import learn_phase
 from inphase.trajectory import Dataset
 from inphase.weight_prior import WeightPrior
+from inphase.workers import check_address
 
 STILL = 1e-12  # of a channel's size: it does not move
 DEFAULT_SIZE = 20  # basis functions a channel; what the demonstrations cannot support is left to the noise
@@ -46,6 +47,7 @@ def fit(
     shrinkage: str | float | None = None,
     calibrate: bool = True,
     jobs: int = 1,
+    cluster: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Model:
     """Learn how two partners move together.
@@ -57,12 +59,16 @@ def fit(
     prior (`inphase.learn_phase` makes one of another order, or periodic), how a partner's tempo may differ, and the
     shrinkage of the prior between features ("between", "ledoit-wolf", "oas", or 0 … 1). Where there are four
     demonstrations or more, the rest is calibrated: demonstrations are held out and played, which takes up to a minute;
-    `calibrate=False` leaves that out. jobs: the processes that play. progress: is told the share that is done.
+    `calibrate=False` leaves that out. jobs: the processes that play. cluster: the address of a dask scheduler
+    (tcp://host:port) whose workers play instead. progress: is told the share that is done.
     Raises DataError for fewer than two demonstrations, no controlled channel, or a channel that never moves;
-    ChannelError for a pattern that fits nothing; OptionError for parts that do not fit each other.
+    ChannelError for a pattern that fits nothing; OptionError for parts that do not fit each other
+    or a cluster that does not answer.
     """
     if not isinstance(dataset, Dataset):
         raise DataError(f"expected a Dataset, as inphase.load makes one, got {type(dataset).__name__}")
+    if cluster is not None:
+        check_address(cluster)
 
     def learner(default: Basis | None, known: Scaling | None) -> Callable[[Dataset], Model]:
         return lambda part: _learn(part, basis, default, known, prior, noise, phase, tempo, shrinkage)
@@ -86,7 +92,16 @@ def fit(
         learn_other = learner(other, model.scaling)
         alternative = Alternative(f"{other.size} functions", learn_other(dataset), learn_other)
     learn_fold = learner(None, model.scaling)
-    return calibrated(dataset, model, learn_fold, alternative=alternative, fixed=fixed, jobs=jobs, progress=progress)
+    return calibrated(
+        dataset,
+        model,
+        learn_fold,
+        alternative=alternative,
+        fixed=fixed,
+        jobs=jobs,
+        cluster=cluster,
+        progress=progress,
+    )
 
 
 def _proposed(dataset: Dataset, model: Model) -> Basis | None:
