@@ -126,19 +126,21 @@ def test_ctrl_c_in_the_middle_loses_nothing(place, whole, run, done, tmp_path):
     assert (process.returncode, errors.replace("".join(kept[3:]), "")) == (130, "inphase: stopped\n")
     assert set(kept) == {"kept 2\n"}
     assert len(kept) < PARTS
-    missing = ROWS - 2 * len(kept)
+    partial = json.loads(output.read_text())
+    missing = partial["missing"]
+    # What is being told when the signal comes may be kept and not told.
+    assert missing in (ROWS - 2 * len(kept), ROWS - 2 * len(kept) - 2)
     assert f"\npartial: {missing} of {ROWS} scores are missing\n" in out
     assert out.startswith("reach: ")
     assert f"wrote {output}; the same command with --resume goes on\n" in out
     psutil.wait_procs(family, timeout=10)
     assert [p for p in family if p.is_running() and p.status() != psutil.STATUS_ZOMBIE] == []
 
-    partial = json.loads(output.read_text())
-    assert (partial["partial"], partial["missing"], len(partial["episodes"])) == (True, missing, ROWS - missing)
+    assert (partial["partial"], len(partial["episodes"])) == (True, ROWS - missing)
     expected = json.loads(whole)
     assert all(row in expected["episodes"] for row in partial["episodes"])
     assert run(*ONE, "-o", output, "--resume")[0] == 0
-    assert done.count("_score") == PARTS - len(kept)
+    assert done.count("_score") == missing // 2
     assert output.read_text() == whole
     assert (expected["partial"], expected["missing"]) == (False, 0)
     done.clear()
