@@ -45,6 +45,7 @@ PUBLIC = [
     "OptionError",
     "PhaseModel",
     "Recording",
+    "Reduction",
     "Response",
     "Role",
     "Scaling",
@@ -55,9 +56,13 @@ PUBLIC = [
     "assess",
     "basis",
     "fit",
+    "learn_active",
     "learn_phase",
     "load",
     "select_basis",
+    "select_channels",
+    "sparse_bases",
+    "sparse_basis",
     "trim",
 ]
 PUBLIC_PACKAGES = ["inphase.basis", "inphase.filters", "inphase.io"]

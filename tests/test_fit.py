@@ -195,6 +195,24 @@ def test_a_noise_replaces_the_noise(demos):
     assert differing(taught(demos), other) == {"noise"}
 
 
+def test_a_bias_adds_its_variance_to_the_noise_of_its_channels(demos):
+    plain = inphase.fit(demos, calibrate=False)
+    name = plain.names[0]
+    biased = inphase.fit(demos, calibrate=False, noise_bias={name: 0.3})
+    added = plain.scaling.unscale_var(biased.noise.var) - plain.scaling.unscale_var(plain.noise.var)
+    assert_allclose(added, [0.09, *[0.0] * (len(added) - 1)], atol=1e-12)
+    everywhere = inphase.fit(demos, calibrate=False, noise_bias={"*": 0.1, name: 0.3})
+    assert_allclose(
+        plain.scaling.unscale_var(everywhere.noise.var) - plain.scaling.unscale_var(plain.noise.var),
+        [0.09, *[0.01] * (len(added) - 1)],
+        atol=1e-12,
+    )
+    with pytest.raises(inphase.OptionError, match=f"noise_bias: expected finite standard deviations >= 0, got {name}: -1"):
+        inphase.fit(demos, noise_bias={name: -1.0})
+    with pytest.raises(inphase.ChannelError, match="elbow"):
+        inphase.fit(demos, noise_bias={"elbow": 1.0})
+
+
 @pytest.mark.parametrize("order", [0, 2])
 def test_a_phase_replaces_the_phase(order, demos):
     phase = inphase.learn_phase(demos, order=order)

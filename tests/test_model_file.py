@@ -90,6 +90,7 @@ MODELS: dict[str, Callable[[np.random.Generator], inphase.Model]] = {
         dataset(rng), basis={"reach": Sigmoid(8), "lift": Gaussian(9, 0.3), "grip": Polynomial(5)}
     ),
     "periodic": periodic,
+    "windows": lambda rng: taught(dataset(rng), active={"reach": (0.1, 0.7), "lift": (0.5, 0.5)}),
     "order 0": with_order(0),
     "order 2": with_order(2),
     "shrinkage": lambda rng: chance_model(rng, phase_model(), shrinkage=0.3, white=False),
@@ -112,6 +113,7 @@ def assert_same_model(one: inphase.Model, other: inphase.Model) -> None:
             assert_array_equal(getattr(getattr(one, part), name), getattr(getattr(other, part), name), strict=True)
     assert one.coordinates.channels == other.coordinates.channels
     assert_array_equal(one.spread, other.spread, strict=True)
+    assert_array_equal(one.active, other.active, strict=True)
 
 
 @pytest.mark.parametrize("make", MODELS.values(), ids=MODELS)
@@ -143,9 +145,10 @@ def test_a_loaded_model_responds_with_the_same_bytes(make, name, rng, tmp_path):
     assert answers[0] == answers[1]
 
 
-def test_every_released_format_still_loads():
-    """files/model_v1.inphase was written once, by `tiny().save`. A file of the past is never written again."""
-    model = inphase.Model.load(RELEASED / "model_v1.inphase")
+@pytest.mark.parametrize("version", [1, 2])
+def test_every_released_format_still_loads(version):
+    """files/model_v*.inphase were written once, by `tiny().save`. A file of the past is never written again."""
+    model = inphase.Model.load(RELEASED / f"model_v{version}.inphase")
     assert_same_model(model, tiny())
     session = model.session(filter="bip")
     for time, reading in ((0.0, -0.6), (0.25, 0.2), (0.5, np.nan), (0.75, 0.9)):
@@ -243,8 +246,8 @@ def test_other_files(tmp_path, whole):
 
 
 def test_a_newer_version_says_so(whole, scratch):
-    message = refused(scratch, whole[:8] + struct.pack("<I", 3) + whole[12:])
-    assert "expected model format 2 or older, got 3: written by a newer inphase" in message
+    message = refused(scratch, whole[:8] + struct.pack("<I", 4) + whole[12:])
+    assert "expected model format 3 or older, got 4: written by a newer inphase" in message
 
 
 def cheaply_refused(path: Path) -> str:
@@ -287,7 +290,7 @@ def parts(content: bytes) -> tuple[dict[str, Any], bytes]:
     return json.loads(content[56 : 56 + size]), content[56 + size :]
 
 
-def sealed(header: Any, payload: bytes, version: int = 2) -> bytes:
+def sealed(header: Any, payload: bytes, version: int = 3) -> bytes:
     """A file with a good checksum over whatever it holds."""
     text = header if isinstance(header, bytes) else json.dumps(header).encode()
     digest = hashlib.sha256(text + payload).digest()
@@ -302,7 +305,7 @@ def test_the_format_is_what_it_promises_to_be(whole, scratch):
 
 def test_the_first_format_had_no_blocks_and_shrank_to_the_diagonal(whole, scratch):
     header, payload = parts(whole)
-    for name in ("tempo", "reflex", "band", "evidence"):
+    for name in ("tempo", "reflex", "band", "evidence", "active"):
         del header[name]
     del header["prior"]["blocks"]
     scratch.write_bytes(sealed(header, payload, version=1))
@@ -342,7 +345,7 @@ HEADER = {  # the shape of the header of `tiny`, for the parameters below
     "prior": {"shrinkage": 0, "trust": 0, "partner": 0, "blocks": []},
     "phase": {"diffusion": 0, "nominal_velocity": 0, "periodic": 0},
     "tempo": dict.fromkeys(TEMPO, 0),
-    **dict.fromkeys(("reflex", "band", "evidence"), 0),
+    **dict.fromkeys(("reflex", "band", "evidence", "active"), 0),
     "provenance": {},
     "arrays": {
         name: [0]
@@ -413,6 +416,7 @@ RIGHT = {  # what of the above is a value like any other
     *(("band", kind) for kind in ("number", "fraction", "huge")),
     ("reflex", "null"),
     ("evidence", "null"),
+    ("active", "null"),
     ("provenance", "empty object"),
 }
 
@@ -560,6 +564,13 @@ def changed(**entries: Any) -> Callable[[dict[str, Any]], None]:
         (changed(phase__periodic=True), "periodic"),
         (changed(phase__nominal_velocity=0), "nominal_velocity"),
         (changed(phase__diffusion=-1), "diffusion"),
+        (changed(active=[[0, 1]]), "each of 2 features, got (1, 2)"),
+        (changed(active=[[0, 1], [0, 1, 1]]), "two phases"),
+        (changed(active=[[0, 1], 0.5]), "list"),
+        (changed(active=[[0, 1], [0, "1"]]), "number"),
+        (changed(active=[[0, 1], [0, 1.5]]), "between 0 and 1"),
+        (changed(active=[[0, 1], [0.7, 0.2]]), "from <= until for 'grip'"),
+        (changed(active=[[0, 1], [0, float("nan")]]), "between 0 and 1"),
     ],
 )
 def test_parts_that_make_no_model(change, expected, whole, scratch):

@@ -227,6 +227,32 @@ def test_the_benchmark_compares_with_a_loop() -> None:
     assert "times faster" in said
 
 
+def test_the_command_chooses_channels(tmp_path, rng: np.random.Generator, capsys) -> None:
+    for i in range(30):
+        t, told, other = np.linspace(0, 1, 40), *rng.normal(size=2)
+        wave = np.sin(3 * t)
+        table = np.column_stack([t, told * wave, other * wave, told * np.cos(3 * t)]) + 0.01 * rng.normal(size=(40, 4))
+        table[:, 0] = t
+        np.savetxt(tmp_path / f"e{i}.csv", table, delimiter=",", header="time,tells,idle,arm", comments="")
+    command = [
+        "select",
+        str(tmp_path),
+        "--observed",
+        "tells",
+        "idle",
+        "--controlled",
+        "arm",
+        "--channels",
+        "*s",
+        "idle",
+    ]
+    assert main(command) == 0
+    said = capsys.readouterr().out
+    assert said.strip().splitlines()[-1] == "keep: --observed tells"
+    assert main([*command, "--json", "--estimator", "neighbours"]) == 0
+    assert json.loads(capsys.readouterr().out)["chosen"] == ["tells"]
+
+
 def test_the_command_tells_mistakes_in_a_line(recordings, capsys) -> None:
     for wrong in (["--criterion", "dic"], ["--per", "finger"], ["--families", "fourier"], ["--sizes", "1"]):
         assert main(["select", str(recordings), "--observed", "c0", "--controlled", "c1", *wrong]) == 2

@@ -16,11 +16,20 @@ from inphase.model import Model
 from inphase.noise import Noise
 from inphase.observation import Observation
 from inphase.phase import PhaseModel
-from inphase.preprocess import Coordinates, Scaling, trim
+from inphase.preprocess import Coordinates, Reduction, Scaling, trim
 from inphase.recording import Recording
 from inphase.result import Estimate, Response, Status
 from inphase.session import Session
-from inphase.training import assess, fit, learn_phase, select_basis
+from inphase.training import (
+    assess,
+    fit,
+    learn_active,
+    learn_phase,
+    select_basis,
+    select_channels,
+    sparse_bases,
+    sparse_basis,
+)
 from inphase.trajectory import Dataset, Demonstration
 from inphase.weight_prior import WeightPrior
 
@@ -44,6 +53,7 @@ __all__ = [
     "OptionError",
     "PhaseModel",
     "Recording",
+    "Reduction",
     "Response",
     "Role",
     "Scaling",
@@ -54,8 +64,12 @@ __all__ = [
     "assess",
     "basis",
     "fit",
+    "learn_active",
     "learn_phase",
     "load",
     "select_basis",
+    "select_channels",
+    "sparse_bases",
+    "sparse_basis",
     "trim",
 ]

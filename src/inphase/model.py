@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from inphase.active import check_windows
 from inphase.arrays import freeze, frozen
 from inphase.basis.layout import Layout
 from inphase.channels import Channel, Role, check_channels
@@ -37,7 +38,8 @@ class Model:
     be drawn from `prior`, read with `noise`, at a phase that moves by `phase`; `tempo` says how a partner's may differ,
     `reflex` what was just seen says of the controlled features at once. spread: (D,) the standard deviation of every
     channel over the demonstrations, in its unit. band: what the standard deviation of a response is multiplied by, so
-    that held-out demonstrations lie in it as often as it says. evidence: what the choices were made by.
+    that held-out demonstrations lie in it as often as it says. evidence: what the choices were made by. active: (F, 2)
+    the phases (from, until) between which each feature is used for inference; by default the whole phase.
     Raises OptionError where the parts do not fit each other.
     """
 
@@ -54,12 +56,14 @@ class Model:
     reflex: Reflex | None = None
     band: float = 1.0
     evidence: Evidence | None = None
+    active: Float[np.ndarray, "_F 2"] = field(default_factory=lambda: np.empty((0, 2)))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "channels", tuple(self.channels))
         object.__setattr__(self, "provenance", dict(self.provenance))
-        freeze(self, spread=self.spread)
         features, weights = self.coordinates.count, self.layout.size
+        everywhere = np.tile([0.0, 1.0], (features, 1))
+        freeze(self, spread=self.spread, active=self.active if self.active.size else everywhere)
         for what, expected, got in (
             ("channels of the coordinates", len(self.channels), len(self.coordinates.channels)),
             ("features of the scaling", features, len(self.scaling.low)),
@@ -87,6 +91,7 @@ class Model:
                 f"expected phase and basis to be both periodic or both not, got phase.periodic={self.phase.periodic} "
                 f"and a basis with periodic={self.layout.periodic}"
             )
+        check_windows(self.active, self.coordinates.names, self.phase.periodic)
 
     def __repr__(self) -> str:
         return (
@@ -98,6 +103,11 @@ class Model:
     def observed_features(self) -> int:
         """How many features the observed channels have; they come first."""
         return len(self.coordinates.features_of(range(len(self.observed))))
+
+    @cached_property
+    def always_active(self) -> bool:
+        """Whether every feature is used for inference at every phase."""
+        return bool((self.active == (0.0, 1.0)).all())
 
     @cached_property
     def names(self) -> tuple[str, ...]:

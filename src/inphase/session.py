@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy.typing import ArrayLike
 
+from inphase.active import open_at
 from inphase.arrays import frozen
 from inphase.channels import match
 from inphase.errors import ObservationError, OptionError, listing
@@ -88,7 +89,8 @@ class Session:
         """Take in one sample and say where the interaction is.
 
         time: [s], never earlier than the last. values: the observed channels in their order, or {name: value} of any
-        channels, controlled ones too; what is NaN, infinite or left out was not seen, and a sample in which nothing
+        channels, controlled ones too; what is NaN, infinite or left out was not seen, nor was a channel whose
+        `model.active` window does not hold the phase foreseen for this time, and a sample in which nothing
         was seen is a prediction alone. So is one that lies more than two ranges outside all demonstrations
         (Status.REFUSED). Raises ObservationError for a time that runs backwards, a wrong number of
         values or an unknown name.
@@ -172,10 +174,11 @@ class Session:
             values = sample
         else:
             # Angles and rotations are read on the branch that lies nearest to what is expected of them.
-            mean = self._belief.phase_mean
-            phase = model.phase.confine(mean[:1] + self._velocity()[0] * dt)
-            near = model.scaling.unscale(model.layout.predict(phase, self._belief.weights_mean)[0])
+            near = model.scaling.unscale(model.layout.predict(self._foreseen(dt), self._belief.weights_mean)[0])
             values = model.coordinates.sample(sample, near)
+        if not model.always_active:  # what reads outside of its window is not seen
+            phase = float(self._foreseen(dt)[0])
+            values = np.where(open_at(model.active, phase % 1.0 if model.phase.periodic else phase), values, np.nan)
         noise_var = model.noise.at(time - self._last_seen)
         scaled = model.scaling.scale(values)
         # One reading in the wrong unit would move the belief for good. The gate is one of values, not of surprise: a
@@ -187,6 +190,10 @@ class Session:
         self._refused |= bool(slips.any())
         seen = seen[~slips]
         return Observation(seen, scaled[seen], noise_var[seen])
+
+    def _foreseen(self, dt: float) -> Float[np.ndarray, " 1"]:
+        """(1,) the phase that is expected dt [s] after the last sample."""
+        return self.model.phase.confine(self._belief.phase_mean[:1] + self._velocity()[0] * dt)
 
     def _slips(
         self, features: Int[np.ndarray, " M"], values: Float[np.ndarray, " M"], time: float, dt: float

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from inphase.arrays import freeze, frozen
-from inphase.channels import Channel, Kind, Role, check_channels, group_of, make_channels
+from inphase.channels import Channel, Kind, Role, check_channels, group_of, make_channels, match
 from inphase.errors import DataError, OptionError, listing
 
 SHORTEST = 3  # samples: two span a line and say nothing about a movement
@@ -161,6 +161,16 @@ class Dataset:
     def subset(self, indices: Sequence[int]) -> Dataset:
         """The data set of these demonstrations alone."""
         return Dataset(self.channels, tuple(self.demonstrations[i] for i in indices), self.provenance)
+
+    def select(self, channels: Sequence[str] | str) -> Dataset:
+        """The data set of the observed channels that fit these names or patterns, and of all controlled ones.
+
+        Raises ChannelError for a pattern that fits no channel, or a quaternion that would be torn apart.
+        """
+        fitting = set(match(channels, self.names))
+        columns = [i for i, c in enumerate(self.channels) if i in fitting or c.role is Role.CONTROLLED]
+        parts = tuple(Demonstration(d.times, d.values[:, columns], d.name) for d in self)
+        return Dataset(tuple(self.channels[i] for i in columns), parts, self.provenance)
 
     def without(self, index: int) -> Dataset:
         """The data set less one demonstration, as leave-one-out needs it; raises OptionError where there is none."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -30,6 +31,7 @@ def fit(
     jobs: tyro.conf.OmitArgPrefixes[Jobs],
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("model.inphase"),
     basis: Annotated[str | None, tyro.conf.arg(metavar="FAMILY:SIZE", help_behavior_hint="")] = None,
+    noise_bias: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=STD...", help_behavior_hint="")] = (),
     order: int = 1,
     periodic: Flag = False,
     quick: Flag = False,
@@ -46,6 +48,7 @@ def fit(
         jobs: who plays held-out recordings
         output: the model file to write
         basis: basis functions of every channel, such as gaussian:15; otherwise the library's choice
+        noise_bias: standard deviations added to the noise of channels, in their unit, such as head_x=0.05
         order: of the phase: 0 alone, 1 with tempo, 2 with a tempo that accelerates
         periodic: an episode is one cycle of an interaction that goes on and on
         quick: hold nothing out: a second instead of up to a minute, but a model that nobody tested
@@ -69,6 +72,7 @@ def fit(
         model = fit_model(
             dataset,
             basis=chosen,
+            noise_bias=_biases(noise_bias),
             phase=phase,
             calibrate=not quick,
             progress=progress,
@@ -85,3 +89,17 @@ def fit(
         print_evidence(console, model)
     console.print(f"wrote {output} ({output.stat().st_size / 1e3:.0f} kB)")
     return 0
+
+
+def _biases(given: Sequence[str]) -> dict[str, float]:
+    """Name or pattern → standard deviation; raises OptionError for what is no NAME=STD."""
+    biases = {}
+    for text in given:
+        name, _, std = text.rpartition("=")
+        try:
+            biases[name] = float(std)
+        except ValueError:
+            raise OptionError(f"--noise-bias: expected NAME=STD, got {text!r}") from None
+        if not name:
+            raise OptionError(f"--noise-bias: expected NAME=STD, got {text!r}")
+    return biases

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,12 +14,15 @@ import tyro
 
 from inphase.cli.basis_text import show_basis
 from inphase.cli.console import Output, counted, waiting
-from inphase.cli.reading import AsJson, Columns, Recordings
+from inphase.cli.reading import AsJson, Columns, Patterns, Recordings
 from inphase.errors import OptionError, listing
 from inphase.io.atomic import check_target
 from inphase.report.replay_picture import check_picture
 from inphase.report.selection_picture import draw_selection
+from inphase.training.channel_selection import select_channels
+from inphase.training.information import ESTIMATORS
 from inphase.training.selection import CRITERIA, FAMILIES, PER, SIZES, BasisSelection, select_basis
+from inphase.trajectory import Dataset
 
 SHOWN = 6  # candidates of a unit in the table
 LEGEND = """\
@@ -39,10 +44,13 @@ def select(
     families: Names = FAMILIES,
     sizes: Sizes = SIZES,
     periodic: Annotated[bool, tyro.conf.arg(help_behavior_hint="")] = False,
+    channels: Patterns = (),
+    threshold: float = 0.07,
+    estimator: Annotated[str, tyro.conf.arg(metavar="|".join(ESTIMATORS))] = "binned",
     picture: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="")] = None,
     json_: AsJson = False,
 ) -> int:
-    """Compare basis functions on recordings.
+    """Compare basis functions on recordings, or choose channels (--channels).
 
     Args:
         data: files, folders or globs of CSV or npz recordings, one episode a file
@@ -52,6 +60,9 @@ def select(
         families: of basis functions
         sizes: numbers of functions; otherwise a range from few to many
         periodic: an episode is one cycle of an interaction that goes on and on
+        channels: choose among these observed channels, names or patterns, those that say most of the controlled ones
+        threshold: of the mutual information that a channel has to add [nat]
+        estimator: of mutual information
         picture: draw criteria and fitted curves into this file (.png, .svg or .pdf)
         json_: print all figures as JSON
     """
@@ -61,6 +72,8 @@ def select(
     if criterion not in CRITERIA:
         raise OptionError(f"--criterion: expected one of {listing(CRITERIA)}, got {criterion!r}")
     dataset = columns.load(data)
+    if channels:
+        return _select_channels(dataset, channels, threshold, estimator, json_)
     with waiting("comparing basis functions"):
         selection = select_basis(dataset, families=families, sizes=sizes, per=per, periodic=periodic)
     if json_:
@@ -71,6 +84,24 @@ def select(
     if picture is not None:
         draw_selection(picture, dataset, selection, criterion)
         console.print(f"wrote {picture}")
+    return 0
+
+
+def _select_channels(dataset: Dataset, channels: Sequence[str], threshold: float, estimator: str, as_json: bool) -> int:
+    with waiting("comparing channels"):
+        found = select_channels(dataset, threshold, estimator, channels=channels)
+    if as_json:
+        json.dump({**asdict(found), "chosen": found.chosen, "names": found.names}, sys.stdout, indent=1)
+        print()
+        return 0
+    console = Output()
+    console.print(str(found))
+    console.print(
+        f"\ninformation: mutual information with the controlled channels, given those above [nat]; chosen are those that\n"
+        f"add more than {threshold:g}, and than chance would ({found.chance:.2f} before any was chosen)",
+        style="dim",
+    )
+    console.print(f"keep: --observed {' '.join(found.names)}" if found.names else "none says anything")
     return 0
 
 

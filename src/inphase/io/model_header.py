@@ -7,10 +7,12 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from inphase import basis
 from inphase.basis import Layout
 from inphase.channels import Channel, Kind, Role
+from inphase.errors import listing
 from inphase.evidence import Evidence, Trial
 from inphase.model import Model
 from inphase.noise import Noise
@@ -24,14 +26,20 @@ from inphase.weight_prior import WeightPrior
 REFLEX_ARRAYS = ("lags", "centre", "scale", "places", "gains", "mean", "error_var")
 REFLEX_NUMBERS = ("width", "trend", "weight", "fade")
 # What older formats did not have, as they meant it.
-SINCE: dict[int, dict[str, Any]] = {2: {"tempo": {}, "reflex": None, "band": 1.0, "evidence": None}}
-SINCE_WITHIN: dict[int, dict[str, dict[str, Any]]] = {2: {"prior": {"blocks": []}}}  # in entries that they had
+SINCE: dict[int, dict[str, Any]] = {
+    2: {"tempo": {}, "reflex": None, "band": 1.0, "evidence": None},
+    3: {"active": None},
+}
+SINCE_WITHIN: dict[int, dict[str, dict[str, Any]]] = {2: {"prior": {"blocks": []}}, 3: {}}  # in entries that they had
 
 
 def renewed(described: dict[str, Any], version: int) -> dict[str, Any]:
-    """A header of an older format as one of today's."""
+    """A header of an older format as one of today; raises ValueError for entries it could not have."""
     for since, entries in SINCE.items():
         if version < since:
+            early = [name for name in entries if name in described]
+            if early:  # the number of the format is not under the checksum
+                raise ValueError(f"expected no entry {listing(early)} in format {version}")
             within = {name: more | described[name] for name, more in SINCE_WITHIN[since].items()}
             described = entries | described | within
     return described
@@ -85,6 +93,7 @@ def describe(model: Model, arrays: dict[str, Any]) -> dict[str, Any]:
         "reflex": None if model.reflex is None else {name: getattr(model.reflex, name) for name in REFLEX_NUMBERS},
         "band": model.band,
         "evidence": None if model.evidence is None else asdict(model.evidence),
+        "active": None if model.always_active else model.active.tolist(),
         "provenance": dict(model.provenance),
         "arrays": {name: list(array.shape) for name, array in arrays.items()},
     }
@@ -141,6 +150,7 @@ def build(described: dict[str, Any], arrays: dict[str, Any]) -> Model:
         reflex=_reflex(described["reflex"], arrays),
         band=_number(described["band"]),
         evidence=_evidence(described["evidence"]),
+        active=_windows(described["active"]),
         provenance={_text(k): _text(v) for k, v in described["provenance"].items()},
     )
 
@@ -170,6 +180,15 @@ def _evidence(described: dict[str, Any] | None) -> Evidence | None:
     )
     conditions = tuple(_text(c) for c in described["conditions"])
     return Evidence(_index(described["held_out"], 2**31), conditions, trials, _number(described["by_the_clock"]))
+
+
+def _windows(described: list[Any] | None) -> Float[np.ndarray, "_ 2"]:
+    if described is None:
+        return np.empty((0, 2))
+    pairs = [_list(pair) for pair in _list(described)]
+    if not pairs or any(len(pair) != 2 for pair in pairs):
+        raise ValueError(f"expected windows of two phases each, got {described!r}")
+    return np.array([[_number(end) for end in pair] for pair in pairs])
 
 
 def _bool(value: object) -> bool:

@@ -18,6 +18,7 @@ from inphase.phase import PhaseModel
 from inphase.preprocess.coordinates import Coordinates
 from inphase.preprocess.scaling import Scaling
 from inphase.tempo import Tempo
+from inphase.training.active import windows
 from inphase.training.calibrate import FEWEST, Alternative
 from inphase.training.calibrate import calibrate as calibrated
 from inphase.training.discrepancy import leave_one_out
@@ -42,9 +43,11 @@ def fit(
     scaling: Scaling | None = None,
     prior: WeightPrior | None = None,
     noise: Noise | None = None,
+    noise_bias: Mapping[str, float] | None = None,
     phase: PhaseModel | None = None,
     tempo: Tempo | None = None,
     shrinkage: str | float | None = None,
+    active: Mapping[str, tuple[float, float]] | None = None,
     calibrate: bool = True,
     jobs: int = 1,
     cluster: str | None = None,
@@ -57,10 +60,13 @@ def fit(
     demonstrations are followed better with them), the scaling of the features, the prior over weights, the observation
     noise in scaled units (else that of the regression, Eq. 2.15, and that of leaving each demonstration out), the phase
     prior (`inphase.learn_phase` makes one of another order, or periodic), how a partner's tempo may differ, and the
-    shrinkage of the prior between features ("between", "ledoit-wolf", "oas", or 0 … 1). Where there are four
-    demonstrations or more, the rest is calibrated: demonstrations are held out and played, which takes up to a minute;
-    `calibrate=False` leaves that out. jobs: the processes that play. cluster: the address of a dask scheduler
-    (tcp://host:port) whose workers play instead. progress: is told the share that is done.
+    shrinkage of the prior between features ("between", "ledoit-wolf", "oas", or 0 … 1). active: phases (from, until) by
+    channel name or pattern, outside of which a channel is not used for inference (`inphase.learn_active` finds them).
+    noise_bias: standard deviations by channel name or pattern, in the channel's unit (quaternions: [rad]), that are
+    added to the noise of what is read (4.2.4). Where there are four demonstrations or more, the rest is calibrated:
+    demonstrations are held out and played, which takes up to a minute; `calibrate=False` leaves that out. jobs: the
+    processes that play. cluster: the address of a dask scheduler (tcp://host:port) whose workers play instead.
+    progress: is told the share that is done.
     Raises DataError for fewer than two demonstrations, no controlled channel, or a channel that never moves;
     ChannelError for a pattern that fits nothing; OptionError for parts that do not fit each other
     or a cluster that does not answer.
@@ -71,7 +77,9 @@ def fit(
         check_address(cluster)
 
     def learner(default: Basis | None, known: Scaling | None) -> Callable[[Dataset], Model]:
-        return lambda part: _learn(part, basis, default, known, prior, noise, phase, tempo, shrinkage)
+        return lambda part: _learn(
+            part, basis, default, known, prior, noise, noise_bias, phase, tempo, shrinkage, active
+        )
 
     model = learner(None, scaling)(dataset)
     if not calibrate or len(dataset) < FEWEST:
@@ -120,9 +128,11 @@ def _learn(
     scaling: Scaling | None,
     prior: WeightPrior | None,
     noise: Noise | None,
+    noise_bias: Mapping[str, float] | None,
     phase: PhaseModel | None,
     tempo: Tempo | None,
     shrinkage: str | float | None,
+    active: Mapping[str, tuple[float, float]] | None,
 ) -> Model:
     """The model of a data set, without playing anything."""
     _check(dataset)
@@ -145,6 +155,8 @@ def _learn(
         noise = noise or both(regression_noise(times, residuals(layout, phases, scaled, weights)), left_out.noise)
         partner, blocks = layout.slices[shown.index(False)].start, tuple(basis.size for basis in layout.bases)
         prior = prior or WeightPrior(weights, trust=left_out.trust, partner=partner, blocks=blocks)
+    if noise_bias:
+        noise = replace(noise, var=noise.var + _bias_var(noise_bias, dataset, coordinates, scaling))
     if shrinkage is not None:
         prior = replace(prior, shrinkage=intensity(shrinkage, prior.samples, prior.blocks))
     return Model(
@@ -159,7 +171,20 @@ def _learn(
         provenance={**dataset.provenance, "demonstrations": str(len(dataset))},
         tempo=tempo if tempo is not None else Tempo(),
         reflex=learn_reflex(times, scaled, sum(shown)),
+        active=windows(active, dataset, coordinates),
     )
+
+
+def _bias_var(
+    noise_bias: Mapping[str, float], dataset: Dataset, coordinates: Coordinates, scaling: Scaling
+) -> Float[np.ndarray, " F"]:
+    """The variance, in scaled units, that is added to the noise of every feature: 0 where nothing is named."""
+    by_channel = spread(noise_bias, dataset.names)
+    wrong = [f"{name}: {bias!r}" for name, bias in by_channel.items() if not 0 <= bias < np.inf]
+    if wrong:
+        raise OptionError(f"noise_bias: expected finite standard deviations >= 0, got {listing(wrong)}")
+    bias = [by_channel.get(dataset.names[positions[0]], 0.0) for positions in coordinates.channel_of]
+    return scaling.scale_var(np.square(np.array(bias, dtype=np.float64)))
 
 
 def _check(dataset: Dataset) -> None:
