@@ -207,7 +207,7 @@ def test_a_bias_adds_its_variance_to_the_noise_of_its_channels(demos):
         [0.09, *[0.01] * (len(added) - 1)],
         atol=1e-12,
     )
-    with pytest.raises(inphase.OptionError, match=f"noise_bias: expected finite standard deviations >= 0, got {name}: -1"):
+    with pytest.raises(inphase.OptionError, match=f"noise_bias: expected finite .*, got {name}: -1"):
         inphase.fit(demos, noise_bias={name: -1.0})
     with pytest.raises(inphase.ChannelError, match="elbow"):
         inphase.fit(demos, noise_bias={"elbow": 1.0})

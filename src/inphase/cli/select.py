@@ -97,8 +97,8 @@ def _select_channels(dataset: Dataset, channels: Sequence[str], threshold: float
     console = Output()
     console.print(str(found))
     console.print(
-        f"\ninformation: mutual information with the controlled channels, given those above [nat]; chosen are those that\n"
-        f"add more than {threshold:g}, and than chance would ({found.chance:.2f} before any was chosen)",
+        f"\ninformation: mutual information with the controlled channels, given those above [nat]; chosen are\n"
+        f"those that add more than {threshold:g}, and than chance would ({found.chance:.2f} before any was chosen)",
         style="dim",
     )
     console.print(f"keep: --observed {' '.join(found.names)}" if found.names else "none says anything")
