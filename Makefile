@@ -18,7 +18,8 @@ demo: $(VENV)/demo  ## learn from real handwriting, and follow a recording that 
 	$(BIN)/inphase demo $(ARGS)
 
 test: lint  ## everything that must hold: lint, then the tests (make test ARGS="-k session")
-	$(BIN)/pytest $(ARGS)
+	@# As many files at a time as there are processors; of one file, tests share what they have set up.
+	$(BIN)/pytest -n auto --dist loadfile $(ARGS)
 
 lint: $(VENV)/dev  ## style, types and arrows
 	$(BIN)/ruff check

@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 import time
+import types
 from collections import deque
 from collections.abc import Iterator
 from functools import partial
@@ -217,6 +218,17 @@ def test_a_process_that_is_killed_ends_the_work():
     with pytest.raises(WorkerError, match="one of 2 processes was killed"), workers(2) as team:
         team.run(os._exit, [(1,)])
     with workers(2) as team:  # and those who come next have others
+        assert team.run(abs, [(-1,)]) == [1]
+
+
+def test_work_that_a_process_cannot_read_is_told(monkeypatch):
+    module = types.ModuleType("only_here")
+    exec("def work(x):\n    return x", module.__dict__)
+    monkeypatch.setitem(sys.modules, "only_here", module)
+    told = pytest.raises(WorkerError, match=r"could not read its work: .*No module named 'only_here'")
+    with told, workers(2) as team:
+        team.run(module.work, [(1,)])
+    with workers(2) as team:
         assert team.run(abs, [(-1,)]) == [1]
 
 

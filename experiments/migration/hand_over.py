@@ -126,7 +126,7 @@ def main(arguments: list[str] | None = None) -> int:
         folds=2 if chosen.quick else 4,
         conditions=conditions,
         others=LEARNERS,
-        jobs=min(cpu_count(), 4),
+        jobs=1 if chosen.quick else min(cpu_count(), 4),
     )
     print(table(found, conditions))
     return 0

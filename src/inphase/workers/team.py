@@ -76,14 +76,18 @@ def _processes(jobs: int) -> Iterator[Callable[..., Future[Any]]]:
     from concurrent.futures.process import BrokenProcessPool
 
     from joblib.externals.loky import get_reusable_executor  # type: ignore[import-untyped]
+    from joblib.externals.loky.process_executor import TerminatedWorkerError  # type: ignore[import-untyped]
 
     pool = get_reusable_executor(int(jobs), timeout=300, initializer=ignore_interrupts)
     try:
         yield pool.submit
     except BaseException as error:
         pool.shutdown(kill_workers=True)
-        if isinstance(error, BrokenProcessPool):
+        if isinstance(error, TerminatedWorkerError):
             raise WorkerError(f"one of {jobs} processes was killed; where memory is short, try fewer jobs") from None
+        if isinstance(error, BrokenProcessPool):  # it could not read its task: a function of a module it does not find
+            cause = str(error.__cause__ or error).strip('" \n').splitlines()[-1]
+            raise WorkerError(f"one of {jobs} processes could not read its work: {cause}") from None
         raise
 
 
