@@ -19,7 +19,7 @@ demo: $(VENV)/demo  ## learn from real handwriting, and follow a recording that 
 
 test: lint  ## everything that must hold: lint, then the tests (make test ARGS="-k session")
 	@# As many files at a time as there are processors; of one file, tests share what they have set up.
-	$(BIN)/pytest -n auto --dist loadfile $(ARGS)
+	$(BIN)/pytest -n logical --dist loadfile $(ARGS)
 
 lint: $(VENV)/dev  ## style, types and arrows
 	$(BIN)/ruff check
