@@ -117,14 +117,6 @@ def confined(model: inphase.Model, members: list[np.ndarray]) -> list[np.ndarray
     return members
 
 
-def dense(belief: GaussianBelief) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and covariance of [φ, φ̇, …, w] of a belief that is kept in the prior's directions."""
-    size, factor = len(belief.phase_mean), belief.model.prior.factor
-    cross = belief.cov[:size, size:] @ factor
-    mean = np.concatenate([belief.phase_mean, belief.weights_mean])
-    return mean, np.block([[belief.phase_cov, cross], [cross.T, belief.weights_cov]])
-
-
 def run(filter: Filter, steps: Steps, seed: int = 0) -> tuple[object, float]:
     """The last belief and the summed log-likelihood."""
     rng = np.random.default_rng(seed)
@@ -152,7 +144,7 @@ def test_bip_is_the_textbook_filter(order: int, periodic: bool, seed: int) -> No
     steps = samples(model, rng)
     belief, total = run(make("bip", model), steps)
     mean, cov, expected = textbook_ekf(model, steps)
-    got_mean, got_cov = dense(belief)
+    got_mean, got_cov = belief.state_moments
     assert_close(got_mean, mean, 1e-10)
     assert_close(got_cov, cov, 1e-10)
     assert total == pytest.approx(expected, rel=1e-10)
@@ -293,7 +285,7 @@ def test_time_and_space_become_correlated_as_proved(rng: np.random.Generator) ->
 
     def block(belief: GaussianBelief, rows: slice, columns: slice) -> float:
         """The largest correlation in a block of the covariance."""
-        cov = dense(belief)[1]
+        cov = belief.state_moments[1]
         stds = np.sqrt(np.diag(cov))
         return float(np.abs(cov / np.outer(stds, stds))[rows, columns].max())
 
@@ -310,11 +302,11 @@ def test_time_and_space_become_correlated_as_proved(rng: np.random.Generator) ->
     assert all(block(after_first, a, b) > some for i, a in enumerate(parts[:3]) for b in parts[:i])
     assert all(block(after_first, a, b) < none for i, a in enumerate(parts[3:], 3) for b in parts[:i])
     # Proposition 1: Σ^{φ,w} = -Σ^{φ,φ} H^φᵀ S⁻¹ H^w Σ^{w,w}.
-    mean, cov = dense(predicted)
+    mean, cov = predicted.state_moments
     row = textbook_h(model, mean)[:1]
     innovation_var = (row @ cov @ row.T)[0, 0] + 0.02
     expected = -cov[:1, :1] * row[0, 0] / innovation_var @ row[:, first] @ cov[first, first]
-    np.testing.assert_allclose(dense(after_first)[1][:1, first], expected, rtol=1e-10, atol=1e-14)
+    np.testing.assert_allclose(after_first.state_moments[1][:1, first], expected, rtol=1e-10, atol=1e-14)
 
     after_second, _ = bip.step(after_first, Observation(np.array([1]), np.array([0.5]), np.array([0.02])), 0.05, rng)
     assert all(block(after_second, a, b) > some for i, a in enumerate(parts[:4]) for b in parts[:i])

@@ -276,6 +276,21 @@ def test_its_likelihood_is_right_on_average_however_few_its_particles_are() -> N
 # ------------------------------------------------------------------------------------------------ what it never does
 
 
+def test_its_moments_are_those_of_particles_that_count_by_their_weights(rng: np.random.Generator) -> None:
+    model = chance_model(rng, phase_model(1, False))
+    made = make("particle", model, particles=6, resample_below=0.0)
+    belief = dataclasses.replace(made.init(rng), log_weights=np.log(rng.dirichlet(np.ones(6))))
+    mean, cov = belief.state_moments
+    expected = sum(w * x for w, x in zip(belief.weights, belief.particles, strict=True))
+    off = belief.particles - expected
+    spread = sum(w * np.outer(x, x) for w, x in zip(belief.weights, off, strict=True))
+    assert_close(mean, expected, 1e-12)
+    assert_close(cov, spread, 1e-12)
+    size = len(belief.phase_mean)
+    assert_close(cov[:size, :size], belief.phase_cov, 1e-12)
+    assert_close(mean[size:], belief.weights_mean, 1e-12)
+
+
 def test_nothing_but_choice_moves_its_weights(rng: np.random.Generator) -> None:
     model = chance_model(rng, phase_model())
     filter = make("particle", model, particles=60)

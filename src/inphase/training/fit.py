@@ -56,7 +56,7 @@ def fit(
     """Learn how two partners move together.
 
     Everything is learned from the data set but what is named: a basis for all channels or by channel name or pattern
-    (what is left out keeps the default: 20 functions, or as many as `select_basis` proposes where held-out
+    (what is left out gets 20 functions; where none is named, all get as many as `select_basis` proposes, if held-out
     demonstrations are followed better with them), the scaling of the features, the prior over weights, the observation
     noise in scaled units (else that of the regression, Eq. 2.15, and that of leaving each demonstration out), the phase
     prior (`inphase.learn_phase` makes one of another order, or periodic), how a partner's tempo may differ, and the

@@ -99,8 +99,8 @@ def select_basis(
     """Compare basis functions on demonstrations.
 
     candidates: what is compared; else every family with every size and a few widths (4.2.2). per: "channel", "group" or
-    "all", what has a basis of its own. All demonstrations are brought to the same phases, as many as the usual one has
-    readings, so that a candidate is fitted to all of them by one factorisation. Noise is estimated, not named.
+    "all", what has a basis of its own. All demonstrations are brought to the same phases, as many as the shorter
+    ones have readings, so that a candidate is fitted to all by one factorisation. Noise is estimated, not named.
     Raises DataError for fewer than three demonstrations (nothing could be held out) or a channel that was never seen,
     OptionError for names and numbers that make no grid.
     """

@@ -63,7 +63,7 @@ class StatCollector:
         if self.steps and (timestamp is None or (last is not None and not timestamp > last)):
             raise DataError(f"timestamp: expected one after {last}, or None for the first step, got {timestamp}")
         mean = np.array(used.get_mean())
-        mean[0] = mean[0] % 1.0 if used.cyclical else np.clip(mean[0], 0.0, 1.0)
+        mean[0] = mean[0] % 1.0 if getattr(used, "cyclical", False) else np.clip(mean[0], 0.0, 1.0)
         members = used.ensemble[used.system_size :].T if hasattr(used, "ensemble") else np.empty((0, 2))
         observed = (
             np.reshape(observed_trajectory, (0, count)) if np.size(observed_trajectory) == 0 else observed_trajectory
