@@ -200,7 +200,7 @@ def test_as_many_functions_are_proposed_as_the_movement_needs(
     assert (basis.size > 20) == more
 
 
-@pytest.mark.parametrize(("size", "taken"), [(0.5, True), (1.5, False)])
+@pytest.mark.parametrize(("size", "taken"), [(0.5, True), (0.999, False), (1.5, False)])
 def test_another_basis_is_taken_where_it_follows_better_by_more_than_chance(
     size: float, taken: bool, model: inphase.Model
 ) -> None:
