@@ -1,0 +1,195 @@
+"""Sensors of different rates, clocks and delays, read at one time: live, and to make data sets of recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from math import inf
+from types import MappingProxyType
+
+import numpy as np
+from jaxtyping import Float
+
+from inphase.arrays import freeze, frozen
+from inphase.channels import Channel, check_unique, spread
+from inphase.errors import DataError, ObservationError, OptionError, listing
+from inphase.runtime.device import Sample, Signal
+from inphase.runtime.source_clock import WINDOW, SourceClock
+from inphase.runtime.track import Fate, Track
+from inphase.trajectory import Demonstration
+
+STALE_AFTER = 3.0  # median steps of a recorded sensor, as `inphase.preprocess` tells a gap
+
+
+class Synchroniser:
+    """What all channels read at one time, from samples of sensors that do not know of each other.
+
+    Between two readings no further apart than the staleness a channel is interpolated linearly, however the samples
+    came; else, and after the newest, the last reading holds for the staleness; what is older or was never seen is NaN.
+    Stamps of sensors that are not in `shared_clock` are brought to the loop's clock (see `SourceClock`).
+
+    sensors: their signals, by name. staleness: [s], one number or by channel name or pattern. channels: those of the
+    model, for what is an angle or a quaternion. history: [s] how far back it can be asked. Raises OptionError and
+    ChannelError for a staleness that is missing or not positive, an unknown sensor, or a channel offered twice.
+    """
+
+    def __init__(
+        self,
+        sensors: Mapping[str, Sequence[Signal]],
+        staleness: float | Mapping[str, float],
+        channels: Sequence[Channel] = (),
+        *,
+        shared_clock: Collection[str] = (),
+        history: float = 1.0,
+        window: float = WINDOW,
+    ) -> None:
+        names = [signal.name for signals in sensors.values() for signal in signals]
+        check_unique(names)
+        stale = _by_channel(staleness, names)
+        if missing := [name for name in names if name not in stale]:
+            raise OptionError(f"expected a staleness [s] of every channel, got none of {listing(missing)}")
+        if unknown := [name for name in shared_clock if name not in sensors]:
+            raise OptionError(f"no sensor is called {listing(unknown)}; the sensors are {listing(sensors)}")
+        if not history >= 0:
+            raise OptionError(f"expected a history of at least 0 s, got {history:g} s")
+        self.names = tuple(names)
+        self._tracks = {
+            name: Track(
+                name,
+                signals,
+                np.array([stale[signal.name] for signal in signals], dtype=np.float64),
+                channels,
+                shared_clock=name in shared_clock,
+                history=history,
+                window=window,
+            )
+            for name, signals in sensors.items()
+        }
+
+    def take(self, sensor: str, samples: Iterable[Sample]) -> None:
+        """Take in what a sensor read; raises ObservationError for an unknown sensor or a wrong number of values."""
+        track = self._tracks.get(sensor)
+        if track is None:
+            raise ObservationError(f"no sensor is called {sensor!r}; the sensors are {listing(self._tracks)}")
+        for sample in samples:
+            track.take(sample)
+
+    def at(self, time: float) -> Float[np.ndarray, " D"]:
+        """(D,) what the channels, in the order of `names`, read at that time [s]; NaN where that is not known."""
+        return frozen(np.concatenate([track.at(time) for track in self._tracks.values()]))
+
+    def ages(self, time: float) -> Float[np.ndarray, " D"]:
+        """(D,) how long before that time [s] each channel was last read; infinite where never."""
+        return frozen(np.concatenate([track.ages(time) for track in self._tracks.values()]))
+
+    @property
+    def counts(self) -> Mapping[str, Mapping[Fate, int]]:
+        """By sensor, what became of its samples."""
+        return MappingProxyType({name: MappingProxyType(dict(t.counts)) for name, t in self._tracks.items()})
+
+    @property
+    def clocks(self) -> Mapping[str, SourceClock]:
+        """By sensor, what is known of its clock."""
+        return MappingProxyType({name: track.clock for name, track in self._tracks.items()})
+
+    def span(self, sensor: str) -> tuple[float, float]:
+        """When the first and the last sample kept of a sensor were read [s]; raises DataError where there is none."""
+        track = self._tracks[sensor]
+        if not track.stamps:
+            raise DataError(f"{sensor}: expected samples, got none that could be used")
+        return track.clock.time_of(track.stamps[0]), track.clock.time_of(track.stamps[-1])
+
+
+@dataclass(frozen=True, eq=False)
+class SensorRecording:
+    """What one sensor read, at its own rate and by its own clock.
+
+    stamps: (T,) [s]. values: (T, D) by its signals, NaN where not read. received: (T,) [s] by a clock that all
+    sensors share; None where the stamps already are.
+    Raises DataError for parts that do not fit, or no sample at all.
+    """
+
+    signals: tuple[Signal, ...]
+    stamps: Float[np.ndarray, " T"]
+    values: Float[np.ndarray, "T D"]
+    received: Float[np.ndarray, " T"] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "signals", tuple(self.signals))
+        freeze(self, stamps=self.stamps, values=self.values)
+        if self.received is not None:
+            freeze(self, received=self.received)
+        expected = (len(self.stamps), len(self.signals))
+        if self.values.shape != expected or len(self.times) != len(self.stamps) or not len(self.stamps):
+            raise DataError(
+                f"recording of {listing(s.name for s in self.signals)}: expected values (T, D) = {expected} with T > 0 "
+                f"and as many times received, got {self.values.shape} and {len(self.times)}"
+            )
+
+    @property
+    def times(self) -> Float[np.ndarray, " T"]:
+        """(T,) when the samples came [s]."""
+        return self.stamps if self.received is None else self.received
+
+    @property
+    def samples(self) -> list[Sample]:
+        """One by one, in the order they came."""
+        order = np.argsort(self.times, kind="stable")
+        return [Sample(self.values[i], float(self.stamps[i]), float(self.times[i])) for i in order]
+
+
+def combine(
+    recordings: Mapping[str, SensorRecording],
+    rate: float,
+    channels: Sequence[Channel] = (),
+    *,
+    staleness: float | Mapping[str, float] | None = None,
+    name: str = "demonstration",
+) -> Demonstration:
+    """Recordings of several sensors as one demonstration, `rate` samples a second, its columns in their order.
+
+    It begins when the last sensor has begun, and ends with the first that ends; one that ends by more than its
+    staleness before all others has died: it is NaN from there. staleness: three median steps of each sensor unless
+    told. Raises OptionError for a rate that is not positive, DataError for sensors
+    that were not recorded at the same time, or one whose clock was set on the way.
+    """
+    if not 0 < rate < inf:
+        raise OptionError(f"expected a rate > 0 [1/s], got {rate}")
+    if staleness is None:
+        staleness = {s.name: _usual(r, column) for r in recordings.values() for column, s in enumerate(r.signals)}
+    together = Synchroniser(
+        {sensor: r.signals for sensor, r in recordings.items()},
+        staleness,
+        channels,
+        shared_clock=[sensor for sensor, r in recordings.items() if r.received is None],
+        history=inf,
+        window=inf,
+    )
+    for sensor, recording in recordings.items():
+        together.take(sensor, recording.samples)
+        if together.counts[sensor].get(Fate.RESTARTED):
+            raise DataError(
+                f"{sensor}: expected the stamps of one clock, got one that was set on the way; cut it there"
+            )
+    spans = {sensor: together.span(sensor) for sensor in recordings}
+    begin, last = (max(span[i] for span in spans.values()) for i in (0, 1))
+    stale = _by_channel(staleness, together.names)
+    holds = {sensor: max(stale[signal.name] for signal in r.signals) for sensor, r in recordings.items()}
+    if any(span[1] <= begin for span in spans.values()):
+        got = ", ".join(f"{sensor} from {first:g} to {end:g} s" for sensor, (first, end) in spans.items())
+        raise DataError(f"{name}: expected sensors that were recorded at the same time, got {got}")
+    end = min(span[1] for sensor, span in spans.items() if last - span[1] <= holds[sensor])
+    times = begin + np.arange(int((end - begin) * rate * (1 + 1e-12)) + 1) / rate
+    return Demonstration(times, np.stack([together.at(float(time)) for time in times]), name)
+
+
+def _by_channel(staleness: float | Mapping[str, float], names: Sequence[str]) -> dict[str, float]:
+    if isinstance(staleness, Mapping):
+        return spread(staleness, names)
+    return dict.fromkeys(names, float(staleness))
+
+
+def _usual(recording: SensorRecording, column: int) -> float:
+    """How long a reading of that column may stand for what follows [s]."""
+    steps = np.diff(np.unique(recording.stamps[np.isfinite(recording.values[:, column])]))
+    return STALE_AFTER * float(np.median(steps)) if len(steps) else 1.0  # read once: there is nothing to go by
