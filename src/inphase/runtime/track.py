@@ -31,7 +31,7 @@ class Fate(str, enum.Enum):
     AHEAD = "dropped: stamped in the future"
     EMPTY = "dropped: nothing was read"
     BROKEN = "dropped: a stamp that is not finite"
-    RESTARTED = "taken, and all before it forgotten: the device's clock was set"
+    RESTARTED = "the device's clock was set: begun anew with it, and all before forgotten"
 
 
 class Track:
@@ -126,9 +126,7 @@ class Track:
         for parts in self._quaternions:
             if np.isnan(values[parts]).any():
                 values[parts] = np.nan
-        if np.isnan(values).all():
-            return Fate.EMPTY
-        fate = self._insert(stamp, values)
+        fate = Fate.EMPTY if np.isnan(values).all() else self._insert(stamp, values)
         return Fate.RESTARTED if restarted else fate
 
     def _out_of_place(self, stamp: float, received: float) -> Fate | None:
