@@ -1,4 +1,4 @@
-"""Files in, values out: recordings as CSV and npz (`load`), model files, and files of IntPrim.
+"""Files in, values out: recordings as CSV and npz (`load`), live runs as MCAP, model files, and files of IntPrim.
 
 Nothing else in the core opens a file.
 """
@@ -10,6 +10,7 @@ from inphase.io.intprim_analysis import read_analysis
 from inphase.io.intprim_analysis_writer import AnalysisHead, AnalysisStep, write_analysis
 from inphase.io.intprim_model import OldModel, read_bip
 from inphase.io.load import load, pick_roles, read_episode
+from inphase.io.mcap_recording import read_recording
 from inphase.io.notes import Note, read_notes
 from inphase.io.table import Table
 
@@ -27,6 +28,7 @@ __all__ = [
     "read_bip",
     "read_episode",
     "read_notes",
+    "read_recording",
     "whole_file",
     "write_analysis",
 ]

@@ -37,12 +37,15 @@ def write_model(model: Model, path: str | PathLike[str]) -> None:
         with there.open("rb") as file:
             if file.read(len(MAGIC)) != MAGIC:
                 raise OptionError(f"cannot write {there}: expected a model or nothing there, got another file")
-    arrays = arrays_of(model)
-    header = json.dumps(describe(model, arrays), ensure_ascii=False, allow_nan=False).encode()
-    payload = b"".join(np.ascontiguousarray(array, dtype="<f8").tobytes() for array in arrays.values())
+    header, payload = _written(model)
     digest = hashlib.sha256(header + payload).digest()
     with whole_file(path) as temporary:
         temporary.write_bytes(PREFIX.pack(MAGIC, FORMAT, len(header), len(payload), digest) + header + payload)
+
+
+def model_hash(model: Model) -> str:
+    """SHA-256 of all that a model is, in hexadecimal: the checksum its file holds, wherever that lies."""
+    return hashlib.sha256(b"".join(_written(model))).hexdigest()
 
 
 def read_model(path: str | PathLike[str]) -> Model:
@@ -63,6 +66,13 @@ def read_model(path: str | PathLike[str]) -> Model:
         raise ModelFileError(f"{name}: expected an entry {error} in the header, got none") from None
     except (ValueError, TypeError, AttributeError, IndexError, OverflowError, RecursionError) as error:
         raise ModelFileError(f"{name}: the header does not describe a model: {error}") from None
+
+
+def _written(model: Model) -> tuple[bytes, bytes]:
+    """Header and payload."""
+    arrays = arrays_of(model)
+    header = json.dumps(describe(model, arrays), ensure_ascii=False, allow_nan=False).encode()
+    return header, b"".join(np.ascontiguousarray(array, dtype="<f8").tobytes() for array in arrays.values())
 
 
 def _read(path: Path, name: str) -> tuple[int, bytes, bytes]:

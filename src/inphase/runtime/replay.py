@@ -1,0 +1,59 @@
+"""A recorded run once more: the same samples through a new session give the same estimates, to the last bit."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from inphase.errors import DataError, OptionError
+from inphase.filters import RECOMMENDED
+from inphase.io.model_file import model_hash
+from inphase.model import Model
+from inphase.recording import Recording
+from inphase.result import Estimate
+from inphase.session import Session
+
+
+def provenance_of(
+    model: Model, filter: str | None = None, seed: int = 0, options: Mapping[str, Any] | None = None, **more: str
+) -> dict[str, str]:
+    """What it takes to make the session of a run once more: the model's hash, its filter, seed and options (as JSON).
+
+    more: other texts, as the configuration. Raises OptionError for options that JSON cannot hold.
+    """
+    try:
+        written = json.dumps(dict(options or {}), allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise OptionError(f"expected filter options that can be written as JSON, got {options}: {error}") from None
+    named = RECOMMENDED if filter is None else filter
+    return {"model": model_hash(model), "filter": named, "seed": str(seed), "options": written, **more}
+
+
+def session_of(recording: Recording, model: Model) -> Session:
+    """A new session like the one that was recorded.
+
+    Raises DataError where the recording does not say which it was, or was made with another model.
+    """
+    told = recording.provenance
+    missing = [key for key in ("model", "filter", "seed", "options") if key not in told]
+    if missing:
+        raise DataError(f"{recording.name}: expected it to name its {', '.join(missing)}; it was not recorded live")
+    if told["model"] != model_hash(model):
+        raise DataError(
+            f"{recording.name}: expected the model it was recorded with, {told['model'][:12]}…, "
+            f"got {model_hash(model)[:12]}…"
+        )
+    try:
+        seed, options = int(told["seed"]), dict(json.loads(told["options"]))
+    except (TypeError, ValueError, RecursionError):
+        raise DataError(f"{recording.name}: expected a whole number as seed and options as JSON") from None
+    return model.session(told["filter"], seed, **options)
+
+
+def replay(recording: Recording, model: Model) -> Iterator[Estimate]:
+    """The estimate of every sample: the recorded ones, as long as none before was lost; raises as `session_of`."""
+    session = session_of(recording, model)
+    names = [channel.name for channel in recording.channels]
+    for time, values in zip(recording.times, recording.values, strict=True):
+        yield session.observe(float(time), dict(zip(names, values.tolist(), strict=True)))
