@@ -317,8 +317,11 @@ def test_a_flipped_bit_is_never_taken_for_a_reading(tmp_path: Path) -> None:
             continue
         assert read.estimates == whole.estimates[: len(read.estimates)]
         np.testing.assert_array_equal(read.values, whole.values[: len(read.values)])
-        assert (read.channels, read.name) == (CHANNELS, "walk")
+        assert (read.channels, read.name, read.provenance["bag"]) == (CHANNELS, "walk", "a")
     assert 0 < refused < len(WHOLE) / 61
+    path.write_bytes(WHOLE.replace(b'{"bag": "a"}', b'{"bag": "b"}'))
+    with pytest.raises(DataError, match="the checksum of the description differs"):
+        read_recording(path)
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
