@@ -13,6 +13,7 @@ import numpy as np
 from inphase.errors import OptionError
 
 PLACE = re.compile(r"(?P<path>[A-Za-z_]\w*(\.[A-Za-z_]\w*)*)(\[(?P<key>[^\[\]]+)\])?")
+NUMBER, LIST = (int, float, np.number), (list, tuple, np.ndarray)
 NAMES = ("name", "joint_names")  # the part of a message that names the entries of its other lists
 LONGEST = 256  # entries of a list that are told one by one
 
@@ -28,9 +29,8 @@ class Field:
 
     def __post_init__(self) -> None:
         if not PLACE.fullmatch(self.place):
-            raise OptionError(
-                f"expected a place in a message, such as position[elbow], pose.position.x or data[3], got {self.place!r}"
-            )
+            examples = "position[elbow], pose.position.x or data[3]"
+            raise OptionError(f"expected a place in a message, such as {examples}, got {self.place!r}")
 
     def of(self, message: Any) -> float:
         """The number; NaN where the message has none there."""
@@ -41,7 +41,7 @@ class Field:
             value = getattr(value, part, None)
         if match["key"] is not None:
             value = _entry(message, value, match["key"])
-        return float(value) if isinstance(value, (int, float, np.number)) else math.nan
+        return float(value) if isinstance(value, NUMBER) else math.nan
 
 
 def _entry(message: Any, values: Any, key: str) -> Any:
@@ -83,11 +83,11 @@ def _fields(whole: Any, part: Any, path: str) -> Iterator[str]:
             names = _names(whole)
             named = len(names) == len(value) and len(set(names)) == len(names)
             yield from (f"{here}[{names[i] if named else i}]" for i in range(min(len(value), LONGEST)))
-        elif not isinstance(value, (str, bytes, list, tuple, np.ndarray)) and not (path == "" and name == "header"):
+        elif not isinstance(value, (str, bytes, *LIST)) and not (path == "" and name == "header"):
             yield from _fields(whole, value, f"{here}.")
 
 
 def _parts(message: Any) -> list[str]:
     """The attributes of a message, in its order: rospy's have slots, those of others are dataclasses."""
-    fields = getattr(message, "__dataclass_fields__", None) or getattr(type(message), "__slots__", ())
+    fields = getattr(message, "__dataclass_fields__", None) or getattr(type(message), "__slots__", None) or ()
     return [name for name in fields if not name.startswith("__")]
