@@ -117,6 +117,11 @@ class Policy:
         if not 0 < self.longest_retreat < float("inf"):
             raise OptionError(f"safety: expected a finite longest_retreat > 0, got {self.longest_retreat}")
 
+    @property
+    def retreats(self) -> tuple[str, ...]:
+        """The names of what is answered by a retreat."""
+        return tuple(trouble.policy for trouble in Trouble if self.answer(trouble) is Answer.RETREAT)
+
     def answer(self, trouble: Trouble) -> Answer:
         """What is done about it."""
         answer: Answer = getattr(self, trouble.policy)

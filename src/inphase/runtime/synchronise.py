@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 from jaxtyping import Float
 
-from inphase.arrays import freeze, frozen
+from inphase.arrays import BoolArray, freeze, frozen
 from inphase.channels import Channel, check_unique, spread
 from inphase.errors import DataError, ObservationError, OptionError, listing
 from inphase.runtime.device import Sample, Signal
@@ -45,7 +45,7 @@ class Synchroniser:
     ) -> None:
         names = [signal.name for signals in sensors.values() for signal in signals]
         check_unique(names)
-        stale = _by_channel(staleness, names)
+        stale = by_channel(staleness, names)
         if missing := [name for name in names if name not in stale]:
             raise OptionError(f"expected a staleness [s] of every channel, got none of {listing(missing)}")
         if unknown := [name for name in shared_clock if name not in sensors]:
@@ -82,6 +82,34 @@ class Synchroniser:
         """(D,) how long before that time [s] each channel was last read; infinite where never."""
         return frozen(np.concatenate([track.ages(time) for track in self._tracks.values()]))
 
+    def fetch(self, until: float, within: float = 0.0) -> list[tuple[float, Float[np.ndarray, " D"]]]:
+        """What was read up to that time [s] and not fetched before: times in order, and (D,), NaN where nothing is new.
+
+        Readings of several channels no further apart than `within` [s] are one, at the time of the newest, as long as
+        no channel is in it twice: nothing is lost, and no more is told than the fastest sensor reads.
+        """
+        ends = np.cumsum([0] + [len(track) for track in self._tracks.values()])
+        fetched = [
+            _Reading(time, stamp, seen, track, slice(begin, end))
+            for track, begin, end in zip(self._tracks.values(), ends[:-1], ends[1:], strict=True)
+            for time, stamp, seen in track.fetch(until)
+        ]
+        rounds: list[list[_Reading]] = []
+        for reading in sorted(fetched, key=lambda reading: reading.time):
+            last = rounds[-1] if rounds else []
+            again = any(r.track is reading.track and (r.seen & reading.seen).any() for r in last)
+            if not last or again or reading.time - last[0].time > within:
+                rounds.append([reading])
+            else:
+                last.append(reading)
+        return [(read[-1].time, frozen(self._read(read))) for read in rounds]
+
+    def _read(self, readings: Sequence[_Reading]) -> Float[np.ndarray, " D"]:
+        values, time = np.full(len(self.names), np.nan), readings[-1].time
+        for r in readings:
+            values[r.columns] = np.where(r.seen, r.track.since(r.stamp, time), values[r.columns])
+        return values
+
     @property
     def counts(self) -> Mapping[str, Mapping[Fate, int]]:
         """By sensor, what became of its samples."""
@@ -98,6 +126,17 @@ class Synchroniser:
         if not track.stamps:
             raise DataError(f"{sensor}: expected samples, got none that could be used")
         return track.clock.time_of(track.stamps[0]), track.clock.time_of(track.stamps[-1])
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """One sample that is new: when, (D,) which of the sensor's channels, and where they stand among all."""
+
+    time: float
+    stamp: float
+    seen: BoolArray
+    track: Track
+    columns: slice
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +212,7 @@ def combine(
             )
     spans = {sensor: together.span(sensor) for sensor in recordings}
     begin, last = (max(span[i] for span in spans.values()) for i in (0, 1))
-    stale = _by_channel(staleness, together.names)
+    stale = by_channel(staleness, together.names)
     holds = {sensor: max(stale[signal.name] for signal in r.signals) for sensor, r in recordings.items()}
     if any(span[1] <= begin for span in spans.values()):
         got = ", ".join(f"{sensor} from {first:g} to {end:g} s" for sensor, (first, end) in spans.items())
@@ -183,7 +222,8 @@ def combine(
     return Demonstration(times, np.stack([together.at(float(time)) for time in times]), name)
 
 
-def _by_channel(staleness: float | Mapping[str, float], names: Sequence[str]) -> dict[str, float]:
+def by_channel(staleness: float | Mapping[str, float], names: Sequence[str]) -> dict[str, float]:
+    """One number for all, or those of names and patterns; raises ChannelError for one that fits nothing."""
     if isinstance(staleness, Mapping):
         return spread(staleness, names)
     return dict.fromkeys(names, float(staleness))

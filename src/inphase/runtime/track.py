@@ -11,7 +11,7 @@ from math import inf
 import numpy as np
 from jaxtyping import Float
 
-from inphase.arrays import FloatArray
+from inphase.arrays import BoolArray, FloatArray
 from inphase.channels import Channel, Kind, Role, quaternions
 from inphase.errors import ObservationError, OptionError
 from inphase.runtime.device import Sample, Signal
@@ -66,6 +66,7 @@ class Track:
         self._angles, self._quaternions = _kinds(name, signals, channels)
         self._stamps: list[float] = []
         self._rows: list[FloatArray] = []
+        self._fresh: list[tuple[float, BoolArray]] = []  # by stamp, which readings nobody has fetched
         self._seen = np.full(len(signals), -inf)
         self._odd_since: float | None = None
 
@@ -77,9 +78,18 @@ class Track:
         self.counts[fate] += 1
         return fate
 
+    def __len__(self) -> int:
+        return len(self._seen)
+
     def at(self, time: float) -> Float[np.ndarray, " D"]:
         """What the channels read at that time of the loop [s]; NaN where that is not known."""
-        stamp = self.clock.stamp_at(time)
+        return self._read_at(self.clock.stamp_at(time))
+
+    def since(self, stamp: float, time: float) -> Float[np.ndarray, " D"]:
+        """What the channels read at that time of the loop [s], which is no earlier than that stamp."""
+        return self._read_at(max(self.clock.stamp_at(time), stamp))  # forth and back a time is off by its last bit
+
+    def _read_at(self, stamp: float) -> Float[np.ndarray, " D"]:
         here = bisect_right(self._stamps, stamp)
         before, since = self._nearest(range(here - 1, -1, -1), stamp)
         after, until = self._nearest(range(here, len(self._stamps)), stamp)
@@ -102,6 +112,12 @@ class Track:
     def ages(self, time: float) -> Float[np.ndarray, " D"]:
         """(D,) how long ago each channel was last read, at that time of the loop [s]; infinite where never."""
         return np.asarray(np.maximum(self.clock.stamp_at(time) - self._seen, 0.0))
+
+    def fetch(self, until: float) -> list[tuple[float, float, BoolArray]]:
+        """What was read up to that time [s] and not fetched before: when, by which stamp, and (D,) which channels."""
+        fresh = [(self.clock.time_of(stamp), stamp, seen) for stamp, seen in self._fresh]
+        self._fresh = [(stamp, seen) for time, stamp, seen in fresh if time > until]
+        return [entry for entry in fresh if entry[0] <= until]
 
     @property
     def stamps(self) -> Sequence[float]:
@@ -138,7 +154,7 @@ class Track:
 
     def _restart(self) -> None:
         self.clock = SourceClock(self._shared, self._window)
-        self._stamps, self._rows, self._odd_since = [], [], None
+        self._stamps, self._rows, self._fresh, self._odd_since = [], [], [], None
         self._seen[:] = -inf
 
     def _insert(self, stamp: float, values: FloatArray) -> Fate:
@@ -150,13 +166,17 @@ class Track:
             if not added.any():
                 return Fate.DUPLICATED
             row[added] = values[added]
+            self._fresh.append((stamp, added))
         else:
             insort(self._stamps, stamp)
             self._rows.insert(place, values)
+            self._fresh.append((stamp, ~np.isnan(values)))
         seen = ~np.isnan(values)
         self._seen[seen] = np.maximum(self._seen[seen], stamp)
         gone = bisect_left(self._stamps, self._stamps[-1] - self._kept)
         del self._stamps[:gone], self._rows[:gone]
+        if gone:
+            self._fresh = [entry for entry in self._fresh if entry[0] >= self._stamps[0]]
         return Fate.TAKEN if last else Fate.REORDERED
 
     def _nearest(self, places: Iterable[int], stamp: float) -> tuple[FloatArray, FloatArray]:

@@ -11,19 +11,25 @@ from inphase.errors import OptionError
 
 
 class Watchdog:
-    """Calls `bark` once when it was not fed for `patience` [s], and again only after another meal.
+    """Calls `bark` when it was not fed for `patience` [s]: once, or every `again` [s] until the next meal.
 
     now: the clock [s] it looks at. The thread sleeps until the next meal is due, so that feeding costs nothing. What
     `bark` raises is kept in `failure`, for the loop to report: the watchdog stays on watch. Use it in a `with`, or
     start and stop it. Raises OptionError for a patience that is not positive.
     """
 
-    def __init__(self, patience: float, bark: Callable[[], None], now: Callable[[], float] = time.perf_counter) -> None:
+    def __init__(
+        self,
+        patience: float,
+        bark: Callable[[], object],
+        now: Callable[[], float] = time.perf_counter,
+        again: float | None = None,
+    ) -> None:
         if not 0 < patience < threading.TIMEOUT_MAX:
             raise OptionError(f"watchdog: expected a finite patience > 0, got {patience}")
         self.patience = patience
         self.failure: Exception | None = None
-        self._bark = bark
+        self._bark, self._again = bark, again
         self._now = now
         self._meal = (0, now())  # its number and time: one assignment, so that no lock is needed
         self._barked_after: int | None = None
@@ -54,14 +60,14 @@ class Watchdog:
         left = fed + self.patience - self._now()
         if left > 0:
             return left
-        if self._barked_after == number:
+        if self._barked_after == number and self._again is None:
             return self.patience
         self._barked_after = number
         try:
             self._bark()
         except Exception as failure:  # noqa: BLE001 - whatever it is, the next lapse has to be seen too
             self.failure = failure
-        return self.patience
+        return self._again or self.patience
 
     def start(self) -> None:
         """Fed as of now, keep watch until it is stopped."""
