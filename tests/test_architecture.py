@@ -344,7 +344,7 @@ def test_what_is_imported_is_declared_and_what_is_declared_is_imported():
     optional = {name_of(r) for r in requirements if "extra ==" in r and "'dev'" not in r.replace('"', "'")}
     distributions = importlib.metadata.packages_distributions()
     roots = {module.split(".")[0] for path in FILES for module, _ in imports(parsed(path)) if module[0] != "."}
-    third_party = roots - set(sys.stdlib_module_names) - {"inphase", "intprim"}
+    third_party = roots - set(sys.stdlib_module_names) - {"inphase", "intprim", "tomllib"}  # Python's own from 3.11 on
     imported = {name_of(distributions[root][0]) if root in distributions else root for root in third_party}
     assert imported <= core | optional
     assert core <= imported
