@@ -1,93 +1,107 @@
-"""Numbers by their place in a message, whoever read it: `position[elbow]`, `pose.position.x`, `data[3]`."""
+"""Numbers by their place in a message, whoever read it: `position[elbow]`, `pose.position.x`, `points[0].time`."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from inphase.errors import OptionError
 
-PLACE = re.compile(r"(?P<path>[A-Za-z_]\w*(\.[A-Za-z_]\w*)*)(\[(?P<key>[^\[\]]+)\])?")
-NUMBER, LIST = (int, float, np.number), (list, tuple, np.ndarray)
+STEP = re.compile(r"\.?(?P<part>[A-Za-z_]\w*)|\[(?P<key>[^\[\]]+)\]")
+PLACE = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*|\[[^\[\]]+\])*")
+NUMBER, LIST = (int, float, np.number, np.bool_), (list, tuple, np.ndarray, bytes)  # rospy's uint8[] are bytes
 NAMES = ("name", "joint_names")  # the part of a message that names the entries of its other lists
-LONGEST = 256  # entries of a list that are told one by one
+LONGEST, MOST = 256, 1024  # entries of a list that are told one by one, and of a message
 
 
 @dataclass(frozen=True)
 class Field:
-    """Where a number stands in a message: attributes with dots, then an entry of a list, by its number or its name.
+    """Where a number stands in a message: attributes after dots, and entries of lists by their number or their name.
 
-    Raises OptionError for a text that is no such place.
+    A time or a duration is a number too [s]. Raises OptionError for a text that is no such place.
     """
 
     place: str
+    _steps: tuple[tuple[str | None, str | None], ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not PLACE.fullmatch(self.place):
             examples = "position[elbow], pose.position.x or data[3]"
             raise OptionError(f"expected a place in a message, such as {examples}, got {self.place!r}")
+        steps = tuple((match["part"], match["key"]) for match in STEP.finditer(self.place))
+        object.__setattr__(self, "_steps", steps)
 
     def of(self, message: Any) -> float:
         """The number; NaN where the message has none there."""
-        match = PLACE.fullmatch(self.place)
-        assert match is not None
-        value = message
-        for part in match["path"].split("."):
-            value = getattr(value, part, None)
-        if match["key"] is not None:
-            value = _entry(message, value, match["key"])
+        value, around = message, [message]
+        for part, key in self._steps:
+            value = getattr(value, part, None) if part else _entry(value, key or "", around)
+            around.append(value)
+        seconds = _seconds(value)
+        if seconds is not None:
+            return seconds
         return float(value) if isinstance(value, NUMBER) else math.nan
-
-
-def _entry(message: Any, values: Any, key: str) -> Any:
-    names = _names(message)
-    place = names.index(key) if key in names else int(key) if key.isascii() and key.isdecimal() else None
-    try:
-        return None if place is None else values[place]
-    except (IndexError, TypeError, KeyError):
-        return None
-
-
-def _names(message: Any) -> list[str]:
-    return next((list(getattr(message, part)) for part in NAMES if hasattr(message, part)), [])
 
 
 def stamp_of(message: Any) -> float | None:
     """When a message was made, by its header [s]; None where it has none, or one that was never set."""
-    stamp = getattr(getattr(message, "header", None), "stamp", None)
-    seconds = getattr(stamp, "secs", getattr(stamp, "sec", None))  # of ROS 1, of ROS 2
-    parts = getattr(stamp, "nsecs", getattr(stamp, "nanosec", None))
-    if seconds is None or parts is None or not (seconds or parts):
-        return None
-    return float(seconds) + 1e-9 * float(parts)
+    return _seconds(getattr(getattr(message, "header", None), "stamp", None)) or None
 
 
 def fields_of(message: Any) -> list[str]:
-    """The places of all numbers in a message but those of its header, in its order."""
-    return list(_fields(message, message, ""))
+    """The places of the numbers in a message but those of its header, in its order; of long ones the first."""
+    return list(islice(_inside(message, "", []), MOST))
 
 
-def _fields(whole: Any, part: Any, path: str) -> Iterator[str]:
+def _inside(part: Any, path: str, around: list[Any]) -> Iterator[str]:
     for name in _parts(part):
-        value, here = getattr(part, name), f"{path}{name}"
-        if isinstance(value, (bool, int, float, np.number)):
-            yield here
-        elif isinstance(value, (list, tuple, np.ndarray)) and all(
-            isinstance(v, (int, float, np.number)) for v in value
-        ):
-            names = _names(whole)
-            named = len(names) == len(value) and len(set(names)) == len(names)
-            yield from (f"{here}[{names[i] if named else i}]" for i in range(min(len(value), LONGEST)))
-        elif not isinstance(value, (str, bytes, *LIST)) and not (path == "" and name == "header"):
-            yield from _fields(whole, value, f"{here}.")
+        if path or name != "header":
+            yield from _places(getattr(part, name), f"{path}.{name}" if path else name, [*around, part])
+
+
+def _places(value: Any, path: str, around: list[Any]) -> Iterator[str]:
+    if isinstance(value, NUMBER) or _seconds(value) is not None:
+        yield path
+    elif isinstance(value, LIST):
+        names = _names(len(value), around)
+        for i, entry in enumerate(value[:LONGEST]):
+            key = names[i] if names and PLACE.fullmatch(f"{path}[{names[i]}]") else str(i)
+            yield from _places(entry, f"{path}[{key}]", [*around, value])
+    elif not isinstance(value, str):
+        yield from _inside(value, path, around)
+
+
+def _entry(values: Any, key: str, around: list[Any]) -> Any:
+    if not isinstance(values, LIST):
+        return None
+    names = _names(len(values), around)
+    place = names.index(key) if key in names else int(key) if key.isascii() and key.isdecimal() else len(values)
+    return values[place] if place < len(values) else None
+
+
+def _names(count: int, around: list[Any]) -> list[str]:
+    """What so many entries are called by their message, or one around it; nothing where they have no names."""
+    for part in reversed(around):
+        for attribute in NAMES:
+            names = getattr(part, attribute, None)  # a text is the name of the message itself
+            if isinstance(names, (list, tuple)) and len(set(names)) == len(names) == count:
+                return list(names)
+    return []
+
+
+def _seconds(stamp: Any) -> float | None:
+    whole = getattr(stamp, "secs", getattr(stamp, "sec", None))  # of ROS 1, of ROS 2
+    parts = getattr(stamp, "nsecs", getattr(stamp, "nanosec", None))
+    return None if whole is None or parts is None else float(whole) + 1e-9 * float(parts)
 
 
 def _parts(message: Any) -> list[str]:
     """The attributes of a message, in its order: rospy's have slots, those of others are dataclasses."""
     fields = getattr(message, "__dataclass_fields__", None) or getattr(type(message), "__slots__", None) or ()
-    return [name for name in fields if not name.startswith("__")]
+    return [name for name in fields if not name.startswith("__") and name != "structure_needs_at_least_one_member"]
