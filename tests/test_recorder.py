@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,8 @@ from mcap.writer import CompressionType, Writer
 import inphase
 from inphase import DataError, Estimate, OptionError, Recording, Response, Status
 from inphase.channels import make_channels
-from inphase.io import mcap_messages, read_recording
+from inphase.io import mcap_messages, read_recorded_model, read_recording
+from inphase.io.model_file import checksum_named, model_bytes, model_hash
 from inphase.recording import RecordedCommand, RecordedEvent
 from inphase.runtime.recorder import FLUSH_EVERY, Recorder
 from inphase.runtime.replay import provenance_of, replay
@@ -76,8 +77,12 @@ def same(one: Response | None, other: Response | None) -> bool:
 
 def read_or_refused(path: Path) -> Recording | None:
     """None for one clear error that names the file; whatever else is raised is a mistake."""
+    return or_refused(read_recording, path)
+
+
+def or_refused(read: Callable[[Path], Any], path: Path) -> Any:
     try:
-        return read_recording(path)
+        return read(path)
     except DataError as refused:
         message = str(refused)
     assert message.startswith(f"{path}: ")
@@ -170,6 +175,148 @@ def test_a_new_session_gives_every_estimate_again(tmp_path: Path, filter: str, o
         next(replay(read, other))
 
 
+def test_a_reset_on_the_way_is_one_in_the_replay(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    session, live = MODEL.session("rbpf", 3, particles=30), []
+    path = tmp_path / "a.mcap"
+    told = provenance_of(MODEL, "rbpf", 3, {"particles": 30})
+    with Recorder(path, MODEL.channels, told, model=MODEL) as recorder:
+        for i in range(60):
+            at = 0.03 * (i - i % 2)  # two at a time
+            if i in (0, 20, 40):  # before the first, between two, and twice in one place
+                for late in range(1 + (i == 40)):
+                    session.reset()
+                    recorder.put_event(RecordedEvent(at - 0.01 * late - 0.001, "reset", "asked for"))
+            if i == 50:  # what is told of others is not a reset, nor is one at no time
+                recorder.put_event(RecordedEvent(at - 0.001, "safety", "reset"))
+                recorder.put_event(RecordedEvent(np.nan, "reset", ""))
+            phase = 0.05 + 0.03 * (i % 20) * 0.8
+            values = MODEL.predict(np.array([phase]))[0, :2] + rng.normal(scale=0.02, size=2)
+            live.append(session.observe(at, values))
+            recorder.put_step(values, live[-1])
+        recorder.put_event(RecordedEvent(99.0, "reset", "after the last"))
+    read = read_recording(path)
+    assert live[20].phase < 0.3 < live[19].phase  # it did begin anew
+    assert tuple(replay(read, MODEL)) == read.estimates == tuple(live)
+    # A sample at the very time of a reset came before it, as the loop promises.
+    at = live[20].time
+    moved = [replace(e, time=at) if e.time == at - 0.001 else e for e in read.events]
+    other = tuple(replay(replace(read, events=tuple(moved)), MODEL))
+    assert other[:20] == read.estimates[:20]
+    assert other[22:40] != read.estimates[22:40]
+    assert other[40:] == read.estimates[40:]
+    (begun,) = [i for i in range(20, 40) if other[i].phase < 0.3 < other[i - 1].phase]
+    assert begun == 22
+
+
+# ---------------------------------------------------------------------------------------------- the model in the file
+
+
+def with_model(target: Any, count: int = 4, model: inphase.Model = MODEL) -> bytes:
+    """A recording that holds its model, and where it lies; it is written as a file of its own would be."""
+    with Recorder(target, model.channels, provenance_of(model, "bip"), model=model) as recorder:
+        for at, values in steps(count):
+            recorder.put_step(values, estimate(at))
+    return model_bytes(model)
+
+
+def test_a_recording_gives_its_model_back(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    held = with_model(path)
+    MODEL.save(tmp_path / "model.inphase")
+    assert held == (tmp_path / "model.inphase").read_bytes()
+    assert checksum_named(held) == model_hash(MODEL)
+    model = read_recorded_model(path)
+    assert model is not None
+    assert model_bytes(model) == held
+    content = path.read_bytes()
+    assert content.count(held) == 1
+    assert content.index(held) < content.index(b'{"time": 0.0')  # before all data: a killed process leaves it
+    with path.open("rb") as file:  # others find it too
+        (attached,) = make_reader(file, validate_crcs=True).iter_attachments()
+    assert (attached.name, attached.data) == ("model.inphase", held)
+    filled(tmp_path / "none.mcap")
+    assert read_recorded_model(tmp_path / "none.mcap") is None
+    with pytest.raises(DataError, match=r"missing\.mcap: cannot be read: No such file"):
+        read_recorded_model(tmp_path / "missing.mcap")
+
+
+def test_a_model_is_recorded_only_with_its_own_hash(tmp_path: Path) -> None:
+    other = chance_model(np.random.default_rng(4), phase_model())
+    for told in ({}, provenance_of(other)):
+        with pytest.raises(OptionError, match="expected a provenance that names the model"):
+            Recorder(tmp_path / "a.mcap", MODEL.channels, told, model=MODEL)
+    assert not (tmp_path / "a.mcap").exists()
+    path = tmp_path / "b.mcap"
+    held, foreign = with_model(path), model_bytes(other)
+    assert len(held) == len(foreign)
+    path.write_bytes(path.read_bytes().replace(held, foreign))
+    with pytest.raises(DataError, match=r"b\.mcap: model\.inphase: expected the model that the recording names"):
+        read_recorded_model(path)
+    assert len(read_recording(path).estimates) == 4  # what was recorded is none the worse for it
+
+
+def model_or_refused(path: Path) -> inphase.Model | None:
+    """As `read_or_refused`; None also where there is none."""
+    return or_refused(read_recorded_model, path)
+
+
+def test_a_damaged_model_is_never_taken_for_one(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    held = with_model(path)
+    whole, content = read_recording(path), path.read_bytes()
+    begin = content.index(held)
+    framed = range(begin - 60, begin + 70)  # lengths, name, kind; then the prefix of the model
+    given = 0
+    for place in [*framed, *range(begin + 70, begin + len(held) + 8, 97)]:
+        mutated = bytearray(content)
+        mutated[place] ^= 1 << place % 8
+        path.write_bytes(mutated)
+        model = model_or_refused(path)
+        if model is not None:
+            given += 1
+            assert model_bytes(model) == held
+        read = read_or_refused(path)
+        if begin <= place < begin + len(held):
+            assert model is None  # its own checksum
+            assert read is not None
+            assert (read.estimates, "damage" in read.provenance) == (whole.estimates, False)
+        elif read is not None:
+            assert read.estimates == whole.estimates[: len(read.estimates)]
+    assert given > 0  # a flipped bit of the media type hurts nobody
+    for size in range(begin - 40, begin + len(held) + 40, 61):
+        path.write_bytes(content[:size])
+        model = model_or_refused(path)
+        read = read_or_refused(path)
+        assert (model is not None) == (size >= begin + len(held) + 4)
+        assert read is None or "damage" in read.provenance
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.one_of(st.binary(max_size=100), st.binary(max_size=60).map(lambda tail: model_bytes(MODEL)[:20] + tail)),
+    st.booleans(),
+)
+@example(model_bytes(MODEL)[:16] + (2**31).to_bytes(8, "little") + bytes(32), True)
+def test_a_model_of_another_hand_gives_an_error_of_ours(tmp_path: Path, content: bytes, named: bool) -> None:
+    """Also one that is named by the recording as it stands there."""
+    stream = io.BytesIO()
+    writer = Writer(stream, compression=CompressionType.NONE)
+    writer.start()
+    told = {"model": checksum_named(content)} if named else {}
+    writer.add_metadata("inphase", mcap_messages.describe_run("a", CHANNELS, told))
+    writer.add_attachment(0, 0, "model.inphase", "", content)
+    writer.finish()
+    (tmp_path / "a.mcap").write_bytes(stream.getvalue())
+    with shapes_unchecked():
+        assert model_or_refused(tmp_path / "a.mcap") is None
+
+
+def test_a_disk_that_is_full_of_the_model_is_told_before_anything_moves() -> None:
+    with pytest.raises(OptionError, match="cannot write the stream: No space left on device"):
+        with_model(FullDisk(room=len(model_bytes(MODEL)) // 2))
+
+
 def test_a_recording_that_names_no_session_is_not_replayed(tmp_path: Path) -> None:
     filled(tmp_path / "a.mcap")
     with pytest.raises(DataError, match=r"walk: expected it to name its model, filter, seed, options"):
@@ -238,11 +385,12 @@ def test_what_is_not_as_promised_is_told_and_the_rest_is_written(tmp_path: Path)
 KILLED = """
 import sys, time
 import numpy as np
-from inphase import Estimate, Status
-from inphase.channels import make_channels
+from inphase import Estimate, Model, Status
 from inphase.runtime.recorder import Recorder
+from inphase.runtime.replay import provenance_of
 
-recorder = Recorder(sys.argv[1], make_channels(["a"], ["b"]), {"bag": "killed"})
+model = Model.load(sys.argv[2])
+recorder = Recorder(sys.argv[1], model.channels, {**provenance_of(model), "bag": "killed"}, model=model)
 start = time.perf_counter()
 while True:
     now = time.perf_counter() - start
@@ -254,8 +402,10 @@ while True:
 
 @pytest.mark.parametrize("lives", [0.05, 1.5])
 def test_a_killed_process_leaves_all_but_the_last_second(tmp_path: Path, lives: float) -> None:
-    path = tmp_path / "a.mcap"
-    with subprocess.Popen([sys.executable, "-c", KILLED, str(path)], stdout=subprocess.PIPE, text=True) as process:
+    path, model = tmp_path / "a.mcap", tmp_path / "a.inphase"
+    MODEL.save(model)
+    command = [sys.executable, "-c", KILLED, str(path), str(model)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         last = 0.0
         while last < lives:
@@ -268,6 +418,8 @@ def test_a_killed_process_leaves_all_but_the_last_second(tmp_path: Path, lives: 
     assert (read.provenance["bag"], read.provenance["damage"][:9]) == ("killed", "cut short")
     assert [e.time for e in read.estimates] == read.times.tolist() == read.values[:, 0].tolist()
     assert (read.times[-1] if len(read.times) else 0.0) > last - 1.0
+    assert (found := read_recorded_model(path)) is not None
+    assert model_bytes(found) == model.read_bytes()
     if lives > 1:
         assert len(read.times) > 100
 
@@ -376,6 +528,9 @@ def test_files_of_another_hand_are_refused_with_the_reason(tmp_path: Path) -> No
     path = tmp_path / "a.mcap"
     path.write_bytes(by_another_hand("/observation", "[" * 10**5))
     with pytest.raises(DataError, match="its content is not that of a recording: RecursionError"):
+        read_recording(path)
+    path.write_bytes(by_another_hand("/command", '{"time": 0, "times": [], "positions": [1]}'))
+    with shapes_unchecked(), pytest.raises(DataError, match="its content is not that of a recording: IndexError"):
         read_recording(path)
     path.write_bytes(by_another_hand("/observation", '{"time": 0, "values": {}}', CompressionType.ZSTD))
     with pytest.raises(DataError, match="got zstd: `mcap decompress` unpacks them"):

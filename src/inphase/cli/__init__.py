@@ -39,6 +39,7 @@ def _run(arguments: Sequence[str]) -> int:
     from inphase.cli.fit import fit
     from inphase.cli.inspect import inspect
     from inphase.cli.replay import replay
+    from inphase.cli.replay_run import is_of_run, replay_run
     from inphase.cli.select import select
     from inphase.cli.validate import validate
 
@@ -47,7 +48,7 @@ def _run(arguments: Sequence[str]) -> int:
         "validate": validate,
         "fit": fit,
         "inspect": inspect,
-        "replay": replay,
+        "replay": replay_run if arguments[:1] == ["replay"] and is_of_run(arguments[1:]) else replay,
         "evaluate": evaluate,
         "select": select,
     }

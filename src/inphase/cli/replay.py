@@ -1,4 +1,4 @@
-"""`inphase replay`: play a recording to a model, sample by sample, as if it were live."""
+"""`inphase replay`: play a recording to a model, sample by sample, as if it were live. Of runs: `replay_run`."""
 
 from __future__ import annotations
 
@@ -36,6 +36,8 @@ def replay(
     json_: AsJson = False,
 ) -> int:
     """Play recordings to a model and score its responses.
+
+    Of a recorded run, `inphase replay RUN.mcap` computes every estimate once more and compares; see its own --help.
 
     Args:
         model: a model file

@@ -10,7 +10,7 @@ from inphase.io.intprim_analysis import read_analysis
 from inphase.io.intprim_analysis_writer import AnalysisHead, AnalysisStep, write_analysis
 from inphase.io.intprim_model import OldModel, read_bip
 from inphase.io.load import load, pick_roles, read_episode
-from inphase.io.mcap_recording import read_recording
+from inphase.io.mcap_recording import read_recorded_model, read_recording
 from inphase.io.notes import Note, read_notes
 from inphase.io.table import Table
 
@@ -28,6 +28,7 @@ __all__ = [
     "read_bip",
     "read_episode",
     "read_notes",
+    "read_recorded_model",
     "read_recording",
     "whole_file",
     "write_analysis",

@@ -1,4 +1,4 @@
-"""How a live run is written as MCAP: one record of what it is of, and JSON messages on five topics.
+"""How a live run is written as MCAP: a record of what it is of, its model, and JSON messages on five topics.
 
 A float is written so that it is read again to the last bit. JSON knows neither NaN nor infinity: NaN is null, infinity
 1e999, which every reader takes for it; a channel that was not seen is left out. Channels and signals are named in every
@@ -23,6 +23,7 @@ from inphase.result import Estimate, Response, Status
 
 FORMAT = "1"
 DESCRIPTION = "inphase"  # the name of the metadata record
+MODEL = "model.inphase"  # the name of the attachment, which is a model file
 OBSERVATION, ESTIMATE, RESPONSE, COMMAND, EVENT = "/observation", "/estimate", "/response", "/command", "/event"
 NUMBER = {"type": ["number", "null"]}
 NUMBERS = {"type": "array", "items": NUMBER}

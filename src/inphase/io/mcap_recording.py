@@ -5,19 +5,20 @@ from __future__ import annotations
 import io
 import json
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from inphase.errors import DataError, InphaseError
+from inphase.errors import DataError, InphaseError, ModelFileError
 from inphase.io.mcap_messages import (
     COMMAND,
     DESCRIPTION,
     ESTIMATE,
     EVENT,
+    MODEL,
     OBSERVATION,
     RESPONSE,
     described_run,
@@ -27,6 +28,8 @@ from inphase.io.mcap_messages import (
     read_observation,
     read_response,
 )
+from inphase.io.model_file import checksum_named, model_of_bytes
+from inphase.model import Model
 from inphase.recording import RecordedCommand, RecordedEvent, Recording
 from inphase.result import Estimate, Response
 
@@ -35,6 +38,7 @@ if TYPE_CHECKING:
 
 COMPRESSED = ("zstd", "lz4")
 MAGIC = b"\x89MCAP0\r\n"
+T = TypeVar("T")
 
 
 def read_recording(path: str | PathLike[str]) -> Recording:
@@ -45,22 +49,32 @@ def read_recording(path: str | PathLike[str]) -> Recording:
     estimate before it: of several the last, and none that was made before all estimates. Raises DataError, naming the
     file, for one that is missing, no recording, or damaged before it says what it is of.
     """
-    path = Path(path)
+    return _read(Path(path), _recording)
+
+
+def read_recorded_model(path: str | PathLike[str]) -> Model | None:
+    """The model that a recording was made with, from the recording; None where it holds none.
+
+    Raises DataError, naming the file, as `read_recording`, and for a model that is damaged or not the one that the
+    recording names.
+    """
+    return _read(Path(path), _recorded_model)
+
+
+def _read(path: Path, parse: Callable[[bytes, str], T]) -> T:
     try:
-        return _recording(path.read_bytes(), path.stem)
+        return parse(path.read_bytes(), path.stem)
     except OSError as error:
         raise DataError(f"{path}: cannot be read: {error.strerror}") from None
     except InphaseError as error:
         raise DataError(f"{path}: {error}") from None
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+    except (ValueError, LookupError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         raise DataError(f"{path}: its content is not that of a recording: {error!r}") from None
 
 
 def _recording(content: bytes, stem: str) -> Recording:
     from mcap.records import Channel, Message, Metadata
 
-    if content[: len(MAGIC)] != MAGIC:
-        raise DataError(f"expected an MCAP file, which begins with {MAGIC!r}, got {content[: len(MAGIC)]!r}")
     described, damage = None, ""
     index: dict[str, int] = {}
     topics: dict[int, str] = {}
@@ -88,9 +102,7 @@ def _recording(content: bytes, stem: str) -> Recording:
             elif topic == EVENT:
                 events.append(read_event(json.loads(record.data)))
     if described is None:
-        raise DataError(
-            f"expected a recording of inphase, got an MCAP file that tells of none{damage and ': '}{damage}"
-        )
+        raise DataError(_foreign(damage))
     name, channels, provenance = described
     return Recording(
         name or stem,
@@ -105,12 +117,41 @@ def _recording(content: bytes, stem: str) -> Recording:
     )
 
 
+def _recorded_model(content: bytes, stem: str) -> Model | None:
+    from mcap.records import Attachment, Metadata
+
+    described, attached, damage = None, None, ""
+    for record in _records(content):
+        if isinstance(record, str):
+            damage = record
+        elif isinstance(record, Metadata) and record.name == DESCRIPTION:
+            described = described_run(record.metadata)
+        elif isinstance(record, Attachment) and record.name == MODEL:
+            attached = record.data
+        if described is not None and attached is not None:
+            break
+    if described is None:
+        raise DataError(_foreign(damage))
+    if attached is None:
+        return None
+    named, got = described[2].get("model", ""), checksum_named(attached)
+    if named != got:
+        raise ModelFileError(f"{MODEL}: expected the model that the recording names, {named[:12]}…, got {got[:12]}…")
+    return model_of_bytes(attached, MODEL)
+
+
+def _foreign(damage: str) -> str:
+    return f"expected a recording of inphase, got an MCAP file that tells of none{damage and ': '}{damage}"
+
+
 def _records(content: bytes) -> Iterator[McapRecord | str]:
     """All records up to the end of the data or the first damage; then a text that says which."""
     from mcap.exceptions import McapError
     from mcap.records import Chunk, DataEnd
     from mcap.stream_reader import StreamReader, breakup_chunk
 
+    if content[: len(MAGIC)] != MAGIC:
+        raise DataError(f"expected an MCAP file, which begins with {MAGIC!r}, got {content[: len(MAGIC)]!r}")
     stream = io.BytesIO(content)  # not the file: a size that is not true would be asked of memory before it is read
     compressed = ""
     records = StreamReader(stream, emit_chunks=True, record_size_limit=len(content)).records

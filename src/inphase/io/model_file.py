@@ -8,6 +8,7 @@ Nothing in it is executed, and no size it names is trusted before the file's own
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import struct
 from os import PathLike
@@ -37,10 +38,15 @@ def write_model(model: Model, path: str | PathLike[str]) -> None:
         with there.open("rb") as file:
             if file.read(len(MAGIC)) != MAGIC:
                 raise OptionError(f"cannot write {there}: expected a model or nothing there, got another file")
+    with whole_file(path) as temporary:
+        temporary.write_bytes(model_bytes(model))
+
+
+def model_bytes(model: Model) -> bytes:
+    """All that a model file holds, to be kept within another file."""
     header, payload = _written(model)
     digest = hashlib.sha256(header + payload).digest()
-    with whole_file(path) as temporary:
-        temporary.write_bytes(PREFIX.pack(MAGIC, FORMAT, len(header), len(payload), digest) + header + payload)
+    return PREFIX.pack(MAGIC, FORMAT, len(header), len(payload), digest) + header + payload
 
 
 def model_hash(model: Model) -> str:
@@ -55,7 +61,26 @@ def read_model(path: str | PathLike[str]) -> Model:
     newer version, or that holds parts that do not fit each other.
     """
     name = Path(path).name
-    version, header, payload = _read(Path(path), name)
+    try:
+        size = Path(path).stat().st_size
+        with Path(path).open("rb") as file:
+            return _model(file, size, name)
+    except OSError as error:
+        raise ModelFileError(f"{name}: cannot be read: {error.strerror}") from None
+
+
+def model_of_bytes(content: bytes, name: str) -> Model:
+    """The model in what `model_bytes` gave; raises as `read_model`, naming it so."""
+    return _model(io.BytesIO(content), len(content), name)
+
+
+def checksum_named(content: bytes) -> str:
+    """The checksum that the bytes of a model name, `model_hash` of it; '' where they are too few."""
+    return PREFIX.unpack_from(content)[4].hex() if len(content) >= PREFIX.size else ""
+
+
+def _model(file: io.BufferedIOBase, size: int, name: str) -> Model:
+    version, header, payload = _read(file, size, name)
     try:
         described = json.loads(header)
         described = renewed(described, version)
@@ -75,36 +100,29 @@ def _written(model: Model) -> tuple[bytes, bytes]:
     return header, b"".join(np.ascontiguousarray(array, dtype="<f8").tobytes() for array in arrays.values())
 
 
-def _read(path: Path, name: str) -> tuple[int, bytes, bytes]:
-    """Format, header and payload of a file that is whole and of a known format."""
-    try:
-        size = path.stat().st_size
-        with path.open("rb") as file:
-            prefix = file.read(PREFIX.size)
-            if prefix[:8] != MAGIC[: len(prefix[:8])] or not prefix:
-                raise ModelFileError(
-                    f"{name}: not an inphase model: expected it to begin with {MAGIC!r}, got {prefix[:8]!r}"
-                )
-            if len(prefix) < PREFIX.size:
-                raise ModelFileError(f"{name}: cut short: expected at least {PREFIX.size} bytes, got {size}")
-            _, version, header_size, payload_size, digest = PREFIX.unpack(prefix)
-            if version > FORMAT or version < 1:
-                raise ModelFileError(
-                    f"{name}: expected model format {FORMAT} or older, got {version}: "
-                    "written by a newer inphase, or damaged at byte 8"
-                )
-            for what, got, limit in (
-                ("header", header_size, LARGEST_HEADER),
-                ("payload", payload_size, LARGEST_PAYLOAD),
-            ):
-                if got > limit:
-                    raise ModelFileError(f"{name}: expected a {what} of at most {limit} bytes, got {got}")
-            expected = PREFIX.size + header_size + payload_size
-            if size != expected:
-                raise ModelFileError(f"{name}: cut short or damaged: expected {expected} bytes, got {size}")
-            content = file.read(header_size + payload_size)
-    except OSError as error:
-        raise ModelFileError(f"{name}: cannot be read: {error.strerror}") from None
+def _read(file: io.BufferedIOBase, size: int, name: str) -> tuple[int, bytes, bytes]:
+    """Format, header and payload of a file of so many bytes that is whole and of a known format."""
+    prefix = file.read(PREFIX.size)
+    if prefix[:8] != MAGIC[: len(prefix[:8])] or not prefix:
+        raise ModelFileError(f"{name}: not an inphase model: expected it to begin with {MAGIC!r}, got {prefix[:8]!r}")
+    if len(prefix) < PREFIX.size:
+        raise ModelFileError(f"{name}: cut short: expected at least {PREFIX.size} bytes, got {size}")
+    _, version, header_size, payload_size, digest = PREFIX.unpack(prefix)
+    if version > FORMAT or version < 1:
+        raise ModelFileError(
+            f"{name}: expected model format {FORMAT} or older, got {version}: "
+            "written by a newer inphase, or damaged at byte 8"
+        )
+    for what, got, limit in (
+        ("header", header_size, LARGEST_HEADER),
+        ("payload", payload_size, LARGEST_PAYLOAD),
+    ):
+        if got > limit:
+            raise ModelFileError(f"{name}: expected a {what} of at most {limit} bytes, got {got}")
+    expected = PREFIX.size + header_size + payload_size
+    if size != expected:
+        raise ModelFileError(f"{name}: cut short or damaged: expected {expected} bytes, got {size}")
+    content = file.read(header_size + payload_size)
     if hashlib.sha256(content).digest() != digest:
         raise ModelFileError(f"{name}: damaged: the checksum of its {len(content)} bytes differs from the one it names")
     return version, content[:header_size], content[header_size:]

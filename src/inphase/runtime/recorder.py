@@ -22,11 +22,14 @@ from inphase.channels import Channel
 from inphase.errors import ObservationError, OptionError, listing
 from inphase.io import mcap_messages as messages
 from inphase.io.atomic import check_target
+from inphase.io.model_file import model_bytes, model_hash
+from inphase.model import Model
 from inphase.recording import RecordedCommand, RecordedEvent
 from inphase.result import Estimate, Response
 
 FLUSH_EVERY = 0.25  # [s]: what a killed process may lose, and a chunk of the file
 LARGEST_TIME = 2**63  # [ns]
+TELLS = "recorder"  # the kind of event that tells what is not in the file
 
 Message = tuple[str, float, Callable[[], str]]  # topic, time, what writes its text: not on the loop's thread
 
@@ -46,16 +49,24 @@ class Recorder:
         channels: Sequence[Channel],
         provenance: Mapping[str, str] | None = None,
         *,
+        model: Model | None = None,
         name: str = "",
         capacity: int = 4096,
     ) -> None:
         """Open a new file, or take a stream that is open, and begin to write.
 
-        channels: all of the model. provenance: see `replay.provenance_of`. capacity: samples, responses, commands and
-        events that may wait. Raises OptionError where the file is there already or cannot be written.
+        channels: all of the model. provenance: see `replay.provenance_of`. model: kept in the file, so that nothing
+        else is needed to replay it. capacity: samples, responses, commands and events that may wait. Raises OptionError
+        where the file is there already or cannot be written, or the model is not the one that the provenance names.
         """
         if capacity < 1:
             raise OptionError(f"expected a capacity of at least 1, got {capacity}")
+        named = (provenance or {}).get("model", "none")
+        if model is not None and named != model_hash(model):
+            raise OptionError(
+                f"expected a provenance that names the model, {model_hash(model)[:12]}…, got {named[:12]}: "
+                "see provenance_of"
+            )
         self.names = tuple(channel.name for channel in channels)
         self.failure: str | None = None
         self._capacity = capacity
@@ -74,7 +85,7 @@ class Recorder:
         )
         self._ids: dict[str, int] = {}
         try:
-            self._begin(messages.describe_run(name, channels, provenance or {}))
+            self._begin(messages.describe_run(name, channels, provenance or {}), model)
         except OSError as error:
             if self._own:
                 _discard(self._own)
@@ -143,7 +154,7 @@ class Recorder:
         """What is to be told of a loss before the next message."""
         if not self._untold:
             return ()
-        told = RecordedEvent(self._last, "recorder", f"{self._untold} lost here: the queue was full")
+        told = RecordedEvent(self._last, TELLS, f"{self._untold} lost here: the queue was full")
         self._untold = 0
         return ((messages.EVENT, told.time, partial(messages.event, told)),)
 
@@ -162,9 +173,11 @@ class Recorder:
 
     # ---------------------------------------------------------------------------------------------- on its own thread
 
-    def _begin(self, described: dict[str, str]) -> None:
+    def _begin(self, described: dict[str, str], model: Model | None) -> None:
         self._writer.start(library="inphase")
         self._writer.add_metadata(messages.DESCRIPTION, described)
+        if model is not None:
+            self._writer.add_attachment(0, 0, messages.MODEL, "application/octet-stream", model_bytes(model))
         for topic in messages.FIELDS:
             schema = self._writer.register_schema(f"inphase{topic}", "jsonschema", messages.schema(topic))
             self._ids[topic] = self._writer.register_channel(topic, "json", schema)
@@ -214,7 +227,7 @@ class Recorder:
             texts = [(topic, at, text().encode()) for topic, at, text in put]
         except (TypeError, ValueError, AttributeError, OverflowError) as error:  # of another type than was promised
             self._unwritten += 1
-            told = RecordedEvent(put[0][1], "recorder", f"one of {put[0][0]} lost, it cannot be written: {error}")
+            told = RecordedEvent(put[0][1], TELLS, f"one of {put[0][0]} lost, it cannot be written: {error}")
             texts = [(messages.EVENT, told.time, messages.event(told).encode())]
         for topic, at, data in texts:
             stamp = int(min(max(at * 1e9, 0.0), LARGEST_TIME)) if math.isfinite(at) else 0

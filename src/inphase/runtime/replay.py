@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections import deque
 from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from math import isfinite
 from typing import Any
 
 from inphase.errors import DataError, OptionError
@@ -13,6 +16,8 @@ from inphase.model import Model
 from inphase.recording import Recording
 from inphase.result import Estimate
 from inphase.session import Session
+
+RESET = "reset"  # the kind of event after which a new interaction begins
 
 
 def provenance_of(
@@ -51,9 +56,26 @@ def session_of(recording: Recording, model: Model) -> Session:
     return model.session(told["filter"], seed, **options)
 
 
+def identical(one: Estimate, other: Estimate) -> bool:
+    """Whether two estimates are the same to the last bit in all they say; what is no number is that in any bits."""
+    return _bits(one) == _bits(other)
+
+
+def _bits(estimate: Estimate) -> list[object]:
+    values = (getattr(estimate, field.name) for field in fields(estimate))
+    return [float(value).hex() if isinstance(value, float) else value for value in values]
+
+
 def replay(recording: Recording, model: Model) -> Iterator[Estimate]:
-    """The estimate of every sample: the recorded ones, as long as none before was lost; raises as `session_of`."""
+    """The estimate of every sample: the recorded ones, as long as none before was lost; raises as `session_of`.
+
+    A new interaction begins with the first sample after the time of an event of the kind "reset".
+    """
     session = session_of(recording, model)
     names = [channel.name for channel in recording.channels]
+    resets = deque(sorted(event.time for event in recording.events if event.kind == RESET and isfinite(event.time)))
     for time, values in zip(recording.times, recording.values, strict=True):
+        while resets and resets[0] < time:
+            resets.popleft()
+            session.reset()
         yield session.observe(float(time), dict(zip(names, values.tolist(), strict=True)))
