@@ -38,6 +38,7 @@ def _run(arguments: Sequence[str]) -> int:
     from inphase.cli.evaluate import evaluate
     from inphase.cli.fit import fit
     from inphase.cli.inspect import inspect
+    from inphase.cli.live import live
     from inphase.cli.replay import replay
     from inphase.cli.replay_run import is_of_run, replay_run
     from inphase.cli.select import select
@@ -51,6 +52,7 @@ def _run(arguments: Sequence[str]) -> int:
         "replay": replay_run if arguments[:1] == ["replay"] and is_of_run(arguments[1:]) else replay,
         "evaluate": evaluate,
         "select": select,
+        "live": live,
     }
     # The products of a filter are small: two threads make each slower, many times so on a busy machine.
     with threadpool_limits(limits=1):

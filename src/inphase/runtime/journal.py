@@ -23,45 +23,45 @@ class Journal:
 
     def __init__(self, recorder: Recorder | None = None, listeners: Sequence[Listener] = ()) -> None:
         self.events: deque[RecordedEvent] = deque(maxlen=REMEMBERED)
-        self._recorder, self._listeners = recorder, list(listeners)
+        self.recorder, self.listeners = recorder, list(listeners)
         self._known: set[tuple[str, str]] = set()
 
     @property
     def lost(self) -> int:
         """How many samples, responses, commands and events are not in the recording."""
-        return 0 if self._recorder is None else self._recorder.lost
+        return 0 if self.recorder is None else self.recorder.lost
 
     @property
     def failure(self) -> str | None:
         """Why nothing is recorded any more."""
-        return None if self._recorder is None else self._recorder.failure
+        return None if self.recorder is None else self.recorder.failure
 
     def step(self, values: FloatArray, estimate: Estimate) -> None:
         """A sample and what the session made of it."""
-        if self._recorder is not None:
-            self._recorder.put_step(values, estimate)
+        if self.recorder is not None:
+            self.recorder.put_step(values, estimate)
 
     def response(self, time: float, response: Response) -> None:
         """A response made at that time [s]."""
-        if self._recorder is not None:
-            self._recorder.put_response(time, response)
+        if self.recorder is not None:
+            self.recorder.put_response(time, response)
 
     def command(self, time: float, command: Command, signals: tuple[str, ...]) -> None:
         """What a robot with these signals was sent at that time [s]."""
-        if self._recorder is not None:
-            self._recorder.put_command(RecordedCommand(time, command.times, command.positions, signals))
+        if self.recorder is not None:
+            self.recorder.put_command(RecordedCommand(time, command.times, command.positions, signals))
 
     def tell(self, time: float, kind: str, reason: str, before: str = "", after: str = "") -> None:
         """An event at that time [s]."""
         event = RecordedEvent(time, kind, reason, before, after)
         self.events.append(event)
-        if self._recorder is not None:
-            self._recorder.put_event(event)
-        for listener in tuple(self._listeners):
+        if self.recorder is not None:
+            self.recorder.put_event(event)
+        for listener in tuple(self.listeners):
             try:
                 listener(event)
             except Exception as error:  # noqa: BLE001 - who listens must not be able to stop a robot's loop
-                self._listeners.remove(listener)
+                self.listeners.remove(listener)
                 self.tell(time, "listener", f"one failed and hears nothing more: {type(error).__name__}: {error}")
 
     def tell_once(self, time: float, kind: str, reason: str) -> None:

@@ -85,6 +85,10 @@ class Loop:
         self._ending = ""  # why it ends
         self._asked: deque[Callable[[], None]] = deque()  # by other threads, for the next cycle
 
+    def __repr__(self) -> str:
+        devices = ", ".join([*(sensor.name for sensor in self.perception.sensors), self.actuation.robot.name])
+        return f"Loop({self.perception.session.model!r} with {devices}; {self.rates})"
+
     # ------------------------------------------------------------------------------------------------ from any thread
 
     @property

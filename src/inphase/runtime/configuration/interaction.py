@@ -201,4 +201,3 @@ def _clock(sensor: Section) -> str:
 def no_limits(limits: Limits, names: Sequence[str]) -> tuple[str, ...]:
     """The signals that may move as fast as they like."""
     return tuple(name for name, velocity in zip(names, limits.velocity, strict=True) if velocity == np.inf)
-
