@@ -32,19 +32,24 @@ SETTLES = 10  # commands after the end of the response, so that what smoothing a
 
 @dataclass(frozen=True)
 class Rates:
-    """How often [1/s] sensors are looked at, a response is made, and a command is sent.
+    """How often [1/s] sensors are looked at, the session observes, a response is made, and a command is sent.
 
-    Raises OptionError for one that is not positive.
+    observe: None for every reading by itself; else all that came since the last time is one observation, averaged.
+    Raises OptionError for a rate that is not positive, or an `observe` above `sense`.
     """
 
     sense: float = 60.0
+    observe: float | None = None
     respond: float = 30.0
     command: float = 60.0
 
     def __post_init__(self) -> None:
-        for name in ("sense", "respond", "command"):
-            if not 0 < getattr(self, name) < inf:
-                raise OptionError(f"rates: expected {name} > 0 [1/s], got {getattr(self, name)}")
+        for name in ("sense", "observe", "respond", "command"):
+            rate = getattr(self, name)
+            if rate is not None and not 0 < rate < inf:
+                raise OptionError(f"rates: expected {name} > 0 [1/s], got {rate}")
+        if self.observe is not None and self.observe > self.sense:
+            raise OptionError(f"rates: expected observe <= sense, got {self.observe:g} and {self.sense:g} [1/s]")
 
 
 class Loop:
@@ -74,7 +79,14 @@ class Loop:
         controlled = model.channels[len(model.observed) :]
         found = check_signals(controlled, [robot])
         self.clock, self.journal = clock, journal or Journal()
-        self.perception = Perception(session, sensors, sight or Sight(), 1 / self.rates.sense, shared_clock)
+        self.perception = Perception(
+            session,
+            sensors,
+            sight or Sight(),
+            1 / self.rates.sense,
+            shared_clock,
+            merge=self.rates.observe is not None,
+        )
         columns = [found[channel.name][1] for channel in controlled]
         self.player = Player(play, controlled, columns, len(robot.signals), model.phase.periodic)
         self.actuation = Actuation(robot, conduct, self.rates.command, play.horizon, clock, self.journal)
@@ -160,7 +172,9 @@ class Loop:
         gc.collect()
         gc.freeze()  # what is there stays, and the collector need not look at it again
         self._begun = now = self.clock.now()
-        self._schedules = [Schedule(rate, now) for rate in (self.rates.sense, self.rates.respond, self.rates.command)]
+        rates = self.rates
+        steady = (rates.sense, rates.observe or rates.sense, rates.respond, rates.command)
+        self._schedules = [Schedule(rate, now) for rate in steady]
         devices = [self.actuation.robot.name, *(sensor.name for sensor in self.perception.sensors)]
         self.journal.tell(now, "start", ", ".join(devices))
 
@@ -182,8 +196,8 @@ class Loop:
         self.timings["late"].add(now - self.due)
         while self._asked:
             self._asked.popleft()()
-        sense, respond, command = self._schedules
-        for schedule, stage in ((sense, self._observe), (respond, self._respond)):
+        sense, observe, respond, command = self._schedules
+        for schedule, stage in ((sense, self._sense), (observe, self._observe), (respond, self._respond)):
             if schedule.is_due(now):
                 schedule.done(now)
                 try:
@@ -232,12 +246,14 @@ class Loop:
 
     # --------------------------------------------------------------------------------------------------- its stages
 
-    def _observe(self, now: float) -> None:
+    def _sense(self, now: float) -> None:
         self._timed("sense", self.perception.sense)
-        for values, estimate in self._timed("observe", partial(self.perception.observe, now)):
-            self.journal.step(values, estimate)
         for sensor, reason in self.perception.failed.items():
             self.journal.tell_once(now, "sensor", f"{sensor} failed and is not read any more: {reason}")
+
+    def _observe(self, now: float) -> None:
+        for values, estimate in self._timed("observe", partial(self.perception.observe, now)):
+            self.journal.step(values, estimate)
 
     def _respond(self, now: float) -> None:
         estimate = self.perception.last

@@ -13,6 +13,7 @@ from inphase.arrays import FloatArray
 from inphase.channels import match
 from inphase.errors import OptionError
 from inphase.result import Estimate
+from inphase.runtime.averaging import averaged
 from inphase.runtime.clock import Clock
 from inphase.runtime.device import Sensor, check_signals
 from inphase.runtime.synchronise import Synchroniser, by_channel
@@ -44,12 +45,20 @@ class Sight:
 class Perception:
     """Reads all sensors, and gives the session every reading of an observed channel, at the time it was read.
 
-    within: [s] apart, readings of several sensors are one observation; the time between two looks. Raises OptionError
-    where the sensors do not offer the session's observed channels in its units, or for a staleness that does not fit.
+    within: [s] apart, readings of several sensors are one observation; the time between two looks. merge: all that is
+    new is one, averaged, so that a session observes no more often than it is asked to. Raises OptionError where the
+    sensors do not offer the session's observed channels in its units, or for a staleness that does not fit.
     """
 
     def __init__(
-        self, session: Session, sensors: Sequence[Sensor], sight: Sight, within: float, shared_clock: Sequence[str] = ()
+        self,
+        session: Session,
+        sensors: Sequence[Sensor],
+        sight: Sight,
+        within: float,
+        shared_clock: Sequence[str] = (),
+        *,
+        merge: bool = False,
     ) -> None:
         observed = session.model.channels[: len(session.model.observed)]
         check_names(sensors)
@@ -58,7 +67,8 @@ class Perception:
         self.last: Estimate | None = None
         self.failed: dict[str, str] = {}
         self.skipped = self.late = 0
-        self._delay, self._within = sight.delay, within
+        self._delay, self._within, self._merge = sight.delay, within, merge
+        self._observed = observed
         offered = {sensor.name: sensor.signals for sensor in sensors}
         names = [signal.name for signals in offered.values() for signal in signals]
         times = dict.fromkeys(names, STALENESS) | by_channel(sight.staleness, names)
@@ -111,7 +121,9 @@ class Perception:
         readings = self.synchroniser.fetch(until, self._within)
         seen = [(time, values[self._order]) for time, values in readings if time > self._since]
         seen = [(time, values) for time, values in seen if not np.isnan(values).all()]
-        if len(seen) > CATCH_UP:
+        if self._merge and len(seen) > 1:
+            seen = [averaged(seen, self._observed)]
+        elif len(seen) > CATCH_UP:
             self.skipped += len(seen) - CATCH_UP
             seen = seen[-CATCH_UP:]
         if not seen and self.session.time is not None and self._stale(now).all():
