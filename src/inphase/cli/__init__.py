@@ -39,6 +39,7 @@ def _run(arguments: Sequence[str]) -> int:
     from inphase.cli.fit import fit
     from inphase.cli.inspect import inspect
     from inphase.cli.live import live
+    from inphase.cli.record import record
     from inphase.cli.replay import replay
     from inphase.cli.replay_run import is_of_run, replay_run
     from inphase.cli.select import select
@@ -52,6 +53,7 @@ def _run(arguments: Sequence[str]) -> int:
         "replay": replay_run if arguments[:1] == ["replay"] and is_of_run(arguments[1:]) else replay,
         "evaluate": evaluate,
         "select": select,
+        "record": record,
         "live": live,
     }
     # The products of a filter are small: two threads make each slower, many times so on a busy machine.

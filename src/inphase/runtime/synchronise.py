@@ -125,7 +125,11 @@ class Synchroniser:
         track = self._tracks[sensor]
         if not track.stamps:
             raise DataError(f"{sensor}: expected samples, got none that could be used")
-        return track.clock.time_of(track.stamps[0]), track.clock.time_of(track.stamps[-1])
+        first, last = (track.clock.time_of(track.stamps[i]) for i in (0, -1))
+        nudge = float(np.spacing(abs(first)))
+        while track.clock.stamp_at(first) < track.stamps[0]:  # rounding: it would be before all that was read
+            first, nudge = first + nudge, 2 * nudge
+        return first, last
 
 
 @dataclass(frozen=True)
@@ -196,16 +200,8 @@ def combine(
         raise OptionError(f"expected a rate > 0 [1/s], got {rate}")
     if staleness is None:
         staleness = {s.name: _usual(r, column) for r in recordings.values() for column, s in enumerate(r.signals)}
-    together = Synchroniser(
-        {sensor: r.signals for sensor, r in recordings.items()},
-        staleness,
-        channels,
-        shared_clock=[sensor for sensor, r in recordings.items() if r.received is None],
-        history=inf,
-        window=inf,
-    )
-    for sensor, recording in recordings.items():
-        together.take(sensor, recording.samples)
+    together = _taken(recordings, channels, staleness)
+    for sensor in recordings:
         if together.counts[sensor].get(Fate.RESTARTED):
             raise DataError(
                 f"{sensor}: expected the stamps of one clock, got one that was set on the way; cut it there"
@@ -220,6 +216,29 @@ def combine(
     end = min(span[1] for sensor, span in spans.items() if last - span[1] <= holds[sensor])
     times = begin + np.arange(int((end - begin) * rate * (1 + 1e-12)) + 1) / rate
     return Demonstration(times, np.stack([together.at(float(time)) for time in times]), name)
+
+
+def fates(
+    recordings: Mapping[str, SensorRecording], channels: Sequence[Channel] = ()
+) -> Mapping[str, Mapping[Fate, int]]:
+    """By sensor, what becomes of its samples in `combine`."""
+    return _taken(recordings, channels, 1.0).counts
+
+
+def _taken(
+    recordings: Mapping[str, SensorRecording], channels: Sequence[Channel], staleness: float | Mapping[str, float]
+) -> Synchroniser:
+    together = Synchroniser(
+        {sensor: r.signals for sensor, r in recordings.items()},
+        staleness,
+        channels,
+        shared_clock=[sensor for sensor, r in recordings.items() if r.received is None],
+        history=inf,
+        window=inf,
+    )
+    for sensor, recording in recordings.items():
+        together.take(sensor, recording.samples)
+    return together
 
 
 def by_channel(staleness: float | Mapping[str, float], names: Sequence[str]) -> dict[str, float]:
