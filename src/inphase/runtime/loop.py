@@ -95,6 +95,7 @@ class Loop:
         self._begun = self._ended = 0.0
         self._closing = inf  # when the interaction has been over for long enough
         self._ending = ""  # why it ends
+        self._responded: Estimate | None = None
         self._asked: deque[Callable[[], None]] = deque()  # by other threads, for the next cycle
 
     def __repr__(self) -> str:
@@ -259,9 +260,11 @@ class Loop:
         estimate = self.perception.last
         if estimate is None:
             return
-        response = self._timed("respond", partial(self.player.respond, self.perception.session, estimate))
-        if response is not None:
-            self.journal.response(now, response)
+        if estimate is not self._responded:  # else the last response still says all there is to say
+            self._responded = estimate
+            response = self._timed("respond", partial(self.player.respond, self.perception.session, estimate))
+            if response is not None:
+                self.journal.response(now, response)
         if not self.player.over:
             self._closing = inf
         elif self._closing == inf:  # what is left of it is played to its end
