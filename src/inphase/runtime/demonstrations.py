@@ -168,7 +168,7 @@ class Demonstrations:
             self.step()
             self._held = self._recorded()
         try:
-            demonstration = joined(self._held, self.channels, self.rate, self._staleness)
+            demonstration, counts = joined(self._held, self.channels, self.rate, self._staleness)
         except DataError as error:
             raise DataError(f"{error}; it is not kept") from None
         try:
@@ -178,7 +178,7 @@ class Demonstrations:
             reason = error.strerror if isinstance(error, OSError) else str(error)
             raise OptionError(f"the episode could not be written into {self.folder}: {reason}") from None
         self.state, self._undoable, self.number = State.IDLE, True, int(path.stem) + 1
-        self._kept.append(described(path, demonstration, self._held, self.channels, self._kept))
+        self._kept.append(described(path, demonstration, counts, self.channels, self._kept))
         return self._kept[-1]
 
     def discard(self) -> str:

@@ -16,8 +16,8 @@ from inphase.errors import DataError, listing
 from inphase.io.csv import write_csv
 from inphase.io.files import SUFFIXES
 from inphase.io.notes import read_notes, write_notes
-from inphase.preprocess.checks import EVERY_EPISODE, Finding, check
-from inphase.runtime.synchronise import SensorRecording, combine, fates
+from inphase.preprocess.checks import EVERY_EPISODE, Finding, check_episode, check_episodes
+from inphase.runtime.synchronise import SensorRecording, combine_counted
 from inphase.runtime.track import Fate
 from inphase.trajectory import Demonstration
 
@@ -57,19 +57,26 @@ def joined(
     channels: Sequence[Channel],
     rate: float,
     staleness: float | Mapping[str, float] | None,
-) -> Demonstration:
-    """What the sensors gave as one demonstration, its columns in the order of the channels, its times from 0 s.
+) -> tuple[Demonstration, dict[str, SensorCount]]:
+    """What the sensors gave as one demonstration, and what was taken of them.
 
-    Raises DataError where that is too little, as `combine`.
+    Its columns are in the order of the channels, its times from 0 s. Raises DataError where that is too little, as
+    `combine`.
     """
-    together = combine(recordings, rate, channels, staleness=staleness, name="the episode")
+    together, fates = combine_counted(recordings, rate, channels, staleness=staleness, name="the episode")
     names = [signal.name for recording in recordings.values() for signal in recording.signals]
     values = together.values[:, [names.index(channel.name) for channel in channels]]
     if len(values) < 3:
         raise DataError(f"the episode: expected at least 3 samples at {rate:g} a second, got {len(values)}")
     if unseen := [c.name for c, column in zip(channels, values.T, strict=True) if np.isnan(column).all()]:
         raise DataError(f"the episode: nothing was read of {listing(unseen)}")
-    return Demonstration(np.arange(len(values)) / rate, values, "the episode")
+    counts = {
+        name: SensorCount(
+            len(r.stamps), _rate(r.times), {fate: number for fate, number in fates[name].items() if fate.dropped}
+        )
+        for name, r in recordings.items()
+    }
+    return Demonstration(np.arange(len(values)) / rate, values, "the episode"), counts
 
 
 def write_next(folder: Path, demonstration: Demonstration, channels: Sequence[Channel]) -> Path:
@@ -107,29 +114,23 @@ def delete(path: Path) -> None:
 def described(
     path: Path,
     demonstration: Demonstration,
-    recordings: Mapping[str, SensorRecording],
+    counts: Mapping[str, SensorCount],
     channels: Sequence[Channel],
     before: Sequence[Episode],
 ) -> Episode:
     """What there is to say of an episode, beside those before it."""
-    told = fates(recordings, channels)
-    episodes = [(e.path.stem, e.times, e.values) for e in before]
-    findings = check([*episodes, (path.stem, demonstration.times, demonstration.values)], channels)
+    episode = path.stem, demonstration.times, demonstration.values
+    across = check_episodes([*((e.path.stem, e.times, e.values) for e in before), episode], channels)
+    known = {(finding.channel, finding.kind) for finding in across if finding.episode == EVERY_EPISODE}
+    alone = [finding for finding in check_episode(*episode, channels) if (finding.channel, finding.kind) not in known]
     gaps = {c.name: _gap(demonstration, column) for column, c in enumerate(channels)}
     return Episode(
         path,
         demonstration.times,
         demonstration.values,
-        {
-            name: SensorCount(
-                len(r.stamps),
-                _rate(r.times),
-                {fate: number for fate, number in told[name].items() if fate.dropped},
-            )
-            for name, r in recordings.items()
-        },
+        counts,
         {name: gap for name, gap in gaps.items() if gap > 0},
-        tuple(finding for finding in findings if finding.episode in (path.stem, EVERY_EPISODE)),
+        (*alone, *(finding for finding in across if finding.episode in (path.stem, EVERY_EPISODE))),
     )
 
 

@@ -196,12 +196,32 @@ def combine(
     told. Raises OptionError for a rate that is not positive, DataError for sensors
     that were not recorded at the same time, or one whose clock was set on the way.
     """
+    return combine_counted(recordings, rate, channels, staleness=staleness, name=name)[0]
+
+
+def combine_counted(
+    recordings: Mapping[str, SensorRecording],
+    rate: float,
+    channels: Sequence[Channel] = (),
+    *,
+    staleness: float | Mapping[str, float] | None = None,
+    name: str = "demonstration",
+) -> tuple[Demonstration, Mapping[str, Mapping[Fate, int]]]:
+    """What `combine` gives, and by sensor, what became of its samples."""
     if not 0 < rate < inf:
         raise OptionError(f"expected a rate > 0 [1/s], got {rate}")
     if staleness is None:
         staleness = {s.name: _usual(r, column) for r in recordings.values() for column, s in enumerate(r.signals)}
-    together = _taken(recordings, channels, staleness)
-    for sensor in recordings:
+    together = Synchroniser(
+        {sensor: r.signals for sensor, r in recordings.items()},
+        staleness,
+        channels,
+        shared_clock=[sensor for sensor, r in recordings.items() if r.received is None],
+        history=inf,
+        window=inf,
+    )
+    for sensor, recording in recordings.items():
+        together.take(sensor, recording.samples)
         if together.counts[sensor].get(Fate.RESTARTED):
             raise DataError(
                 f"{sensor}: expected the stamps of one clock, got one that was set on the way; cut it there"
@@ -215,30 +235,7 @@ def combine(
         raise DataError(f"{name}: expected sensors that were recorded at the same time, got {got}")
     end = min(span[1] for sensor, span in spans.items() if last - span[1] <= holds[sensor])
     times = begin + np.arange(int((end - begin) * rate * (1 + 1e-12)) + 1) / rate
-    return Demonstration(times, np.stack([together.at(float(time)) for time in times]), name)
-
-
-def fates(
-    recordings: Mapping[str, SensorRecording], channels: Sequence[Channel] = ()
-) -> Mapping[str, Mapping[Fate, int]]:
-    """By sensor, what becomes of its samples in `combine`."""
-    return _taken(recordings, channels, 1.0).counts
-
-
-def _taken(
-    recordings: Mapping[str, SensorRecording], channels: Sequence[Channel], staleness: float | Mapping[str, float]
-) -> Synchroniser:
-    together = Synchroniser(
-        {sensor: r.signals for sensor, r in recordings.items()},
-        staleness,
-        channels,
-        shared_clock=[sensor for sensor, r in recordings.items() if r.received is None],
-        history=inf,
-        window=inf,
-    )
-    for sensor, recording in recordings.items():
-        together.take(sensor, recording.samples)
-    return together
+    return Demonstration(times, np.stack([together.at(float(time)) for time in times]), name), together.counts
 
 
 def by_channel(staleness: float | Mapping[str, float], names: Sequence[str]) -> dict[str, float]:
