@@ -220,7 +220,7 @@ def test_a_bag_of_nothing_that_is_mapped_is_left_out_of_many_and_refused_alone(t
     dataset, left_out = read_bags([good, empty, other], MAP)
     assert len(dataset) == 1
     assert [(left.bag, left.what) for left in left_out] == [(str(empty), ""), (str(other), "")]
-    with pytest.raises(DataError, match=r"empty\.bag: expected numbers on a topic of the map, got none: .*: not"):
+    with pytest.raises(DataError, match=r"empty\.bag: expected numbers on a topic of the map, got none: the bag: it"):
         read_bags([empty], MAP)
     with pytest.raises(DataError, match="apart: expected sensors that were recorded at the same time, got /hand/pose"):
         read_bags([apart], TopicMap(*places, rate=60.0))

@@ -34,6 +34,7 @@ def _run(arguments: Sequence[str]) -> int:
     import tyro
     from threadpoolctl import threadpool_limits
 
+    from inphase.cli.bags import bags
     from inphase.cli.demo import demo
     from inphase.cli.evaluate import evaluate
     from inphase.cli.fit import fit
@@ -53,6 +54,7 @@ def _run(arguments: Sequence[str]) -> int:
         "replay": replay_run if arguments[:1] == ["replay"] and is_of_run(arguments[1:]) else replay,
         "evaluate": evaluate,
         "select": select,
+        "bags": bags,
         "record": record,
         "live": live,
     }

@@ -168,8 +168,8 @@ def _together(recordings: Mapping[str, SensorRecording], topic_map: TopicMap, na
 def _missing(bag: Bag, rows: Mapping[str, _Rows], stamps: str) -> dict[str, str]:
     """What the map asks for and the bag does not give, and why."""
     there = {connection.topic for connection in bag.connections}
-    missing = {}
-    for topic, row in rows.items():
+    missing = {} if there else {"the bag": "it holds no topic"}
+    for topic, row in rows.items() if there else ():
         unseen = [channel for channel, seen in zip(row.places, row.seen, strict=True) if not seen]
         if topic not in there:
             missing[topic] = f"not in the bag, and so no {listing(unseen)}; its topics are {listing(sorted(there))}"
