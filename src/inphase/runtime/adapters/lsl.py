@@ -4,18 +4,12 @@ The stamps of a stream are kept as they are: they are another clock, whose offse
 own `time_correction` is not added: it is learned anew every few seconds, and each time it would make the stamps jump;
 what it knows better is the shortest delay on the way, which is about 0.1 ms.
 
-Streams are looked for on this machine alone unless `scope="network"` is asked for. That is for the whole process, as
-liblsl reads its settings once, from a file that is written for it (`LSLAPICFG`) before it is loaded; a file that the
-user has set up is left alone and decides.
+Streams are looked for on this machine alone unless `scope="network"` is asked for (see `lsl_library`).
 """
 
 from __future__ import annotations
 
-import atexit
-import os
-import tempfile
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,25 +18,13 @@ from inphase.channels import check_unique, spread
 from inphase.errors import OptionError, listing
 from inphase.io.mcap_messages import event as as_json
 from inphase.recording import RecordedEvent
+from inphase.runtime.adapters.lsl_library import load_lsl
 from inphase.runtime.clock import Clock
 from inphase.runtime.device import Sample, Signal
 
-LOOPBACK = """[ports]
-IPv6 = disable
-[multicast]
-ResolveScope = machine
-ListenAddress = 127.0.0.1
-[lab]
-KnownPeers = {127.0.0.1}
-[log]
-level = -2
-"""
-SCOPES = ("machine", "network")
-OWN_FILES = (Path("lsl_api.cfg"), Path("~/lsl_api/lsl_api.cfg"), Path("/etc/lsl_api/lsl_api.cfg"))
+SECOND = 0.5  # [s] for which a second stream of the same name is waited for
 CHUNK = 1024  # samples that are taken at once
 BUFFER = 10  # [s] of samples that wait to be read, or hundreds of samples of a stream without a rate
-
-_scope: str | None = None  # what liblsl was loaded with
 
 
 class LslSensor:
@@ -86,17 +68,19 @@ class LslSensor:
         """Find the stream and begin to listen."""
         self.stop()
         found = self._lsl.resolve_bypred(self._wanted, 1, self._timeout)
+        if found:  # the first was enough for that: a second takes a moment longer
+            found = self._lsl.resolve_bypred(self._wanted, 2, SECOND) or found
         if len(found) != 1:
             there = found or self._lsl.resolve_streams(1.0)
             names = listing(f"{s.name()!r} of type {s.type()!r} from {s.hostname()}" for s in there)
             raise OptionError(f"{self.name}: expected one LSL stream with {self._wanted}, found {names}")
         if found[0].channel_format() == self._lsl.cf_string:
             raise OptionError(f"{self.name}: expected a stream of numbers, got one of texts with {self._wanted}")
-        inlet = self._lsl.StreamInlet(found[0], max_buflen=BUFFER)
+        inlet = self._open(found[0])
         try:
             self._columns = self._find(inlet.info(self._timeout))
             inlet.open_stream(self._timeout)
-        except (TimeoutError, self._lsl.LostError):
+        except (self._lsl.util.TimeoutError, self._lsl.util.LostError):
             raise OptionError(
                 f"{self.name}: the stream with {self._wanted} was found, and did not answer in {self._timeout:g} s"
             ) from None
@@ -114,7 +98,7 @@ class LslSensor:
                 stamps += times
                 if len(times) < CHUNK:
                     break
-        except self._lsl.LostError:  # of a stream without a source_id; others liblsl finds again by itself
+        except self._lsl.util.LostError:  # others liblsl finds again by itself
             self._inlet, self._search = None, self._lsl.ContinuousResolver(pred=self._wanted)
         now = self._clock.now()
         return [
@@ -126,12 +110,17 @@ class LslSensor:
         """Let go of the stream."""
         self._clock = self._inlet = self._search = None
 
+    def _open(self, info: Any) -> Any:
+        # liblsl's own recovery knows a stream by its source_id, and cannot ask for a name with an apostrophe.
+        recover = bool(info.source_id()) and "'" not in info.name() + info.type() + info.source_id()
+        return self._lsl.StreamInlet(info, max_buflen=BUFFER, recover=recover)
+
     def _listening(self) -> bool:
         """Whether there is a stream; of one that was lost, whether it is back."""
         if self._inlet is None:
             back = [info for info in self._search.results() if info.channel_count() > max(self._columns)]
             if back:
-                self._inlet, self._search = self._lsl.StreamInlet(back[0], max_buflen=BUFFER), None
+                self._inlet, self._search = self._open(back[0]), None
         return self._inlet is not None
 
     def _find(self, info: Any) -> list[int]:
@@ -185,32 +174,6 @@ class LslMarkers:
     def stop(self) -> None:
         """Take the stream away."""
         self._outlet = None
-
-
-def load_lsl(scope: str = "machine") -> Any:
-    """The library `pylsl`, which looks for streams in that scope; raises OptionError where it is missing or differs."""
-    global _scope
-    if scope not in SCOPES:
-        raise OptionError(f"scope: expected one of {listing(SCOPES)}, got {scope!r}")
-    if _scope not in (None, scope):
-        raise OptionError(f"scope: expected {_scope!r}, as another LSL device of this process has, got {scope!r}")
-    own = "LSLAPICFG" in os.environ or any(file.expanduser().exists() for file in OWN_FILES)
-    if _scope is None and scope == "machine" and not own:
-        handle, path = tempfile.mkstemp(prefix="inphase-lsl-", suffix=".cfg")
-        with os.fdopen(handle, "w") as file:
-            file.write(LOOPBACK)
-        os.environ["LSLAPICFG"] = path
-        atexit.register(Path(path).unlink, missing_ok=True)
-    try:
-        import pylsl
-    except ImportError:
-        raise OptionError("LSL needs pylsl: pip install 'inphase[lsl]'") from None
-    except (RuntimeError, OSError) as error:
-        raise OptionError(
-            f"pylsl found no liblsl: install it (https://github.com/sccn/liblsl/releases) and name it in PYLSL_LIB: {error}"
-        ) from None
-    _scope = scope
-    return pylsl
 
 
 def _quoted(text: str) -> str:
