@@ -144,7 +144,7 @@ def test_wrong_names_labels_units_and_texts_are_refused(outlets):
         LslSensor("hand", name, {"a": "z"}).start(clock)
     with pytest.raises(OptionError, match="hand: expected one channel '3' in the stream, which has x, y, gap"):
         LslSensor("hand", name, {"a": 3}).start(clock)
-    with pytest.raises(OptionError, match="hand: expected 'a' in 'mm', the stream has 'm'"):
+    with pytest.raises(OptionError, match="hand: 'a' is in 'm' in the stream, expected 'mm'"):
         LslSensor("hand", name, {"a": "x"}, units={"a": "mm"}).start(clock)
     with pytest.raises(OptionError, match="expected a stream of numbers, got one of texts"):
         LslSensor("hand", texts, {"a": "x"}).start(clock)
