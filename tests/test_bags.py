@@ -21,6 +21,7 @@ from inphase.io import read_recording
 from inphase.runtime import FakeClock, Sensor, Signal
 from inphase.runtime.adapters import bag_messages
 from inphase.runtime.adapters.bags import TopicMap, bag_sensor, list_bag, read_bag, read_bags, read_topic_map
+from inphase.runtime.configuration.section import Section
 from inphase.runtime.recorder import Recorder
 
 OFFSETS = {"pose": -123.25, "joints": 5e4}  # [s] of the clocks that stamp, against that of the bag
@@ -110,10 +111,12 @@ def test_a_data_set_has_the_roles_units_and_order_of_the_map(tmp_path):
 
 
 def test_a_bag_is_played_as_a_sensor(tmp_path):
-    path = write_bag(tmp_path, "bag", walk(rates=(100, 60)))
+    write_bag(tmp_path, "bag", walk(rates=(100, 60)))
     toml = tmp_path / "map.toml"
     toml.write_text('rate = 50\n[observed]\nx = "/hand/pose pose.position.x"\n[units]\nx = "m"\n')
-    sensor = bag_sensor("walk", str(path), str(toml), speed=2.0)
+    table = {"file": "walk.bag", "map": "map.toml", "speed": 2}  # as a configuration says it
+    sensor = Section("live.toml", "", tmp_path, table).call(bag_sensor, name="walk")
+    assert sensor.name == "walk"
     assert isinstance(sensor, Sensor)
     assert sensor.signals == (Signal("x", "m"),)
     clock = FakeClock()

@@ -23,6 +23,7 @@ from inphase.runtime import Sensor, Signal, Synchroniser, SystemClock
 from inphase.runtime.adapters import lsl_library
 from inphase.runtime.adapters.lsl import LslMarkers, LslSensor
 from inphase.runtime.adapters.lsl_library import load_lsl
+from inphase.runtime.configuration.section import Section
 
 PATIENCE = 20.0  # [s] on a busy machine
 LABELS = "x,y,gap"
@@ -164,7 +165,8 @@ def test_two_streams_of_one_name_are_not_guessed_between(outlets):
 def test_whole_numbers_are_read_as_numbers(outlets):
     name = unique()
     program = outlets(name, form="int32", labels="n")
-    sensor = LslSensor("counter", name, {"n": "n"})
+    table = {"stream": name, "channels": {"n": 0}, "units": {"n": "m"}, "timeout": 5}  # as a configuration says it
+    sensor = Section("live.toml", "", Path(), table).call(LslSensor, name="counter")
     sensor.start(SystemClock())
     send(program)
     samples = gather(sensor, lambda got: len(got) >= 5)

@@ -78,9 +78,9 @@ def _described(found: BagListing) -> dict[str, Any]:
 
 def _print(console: Output, found: BagListing) -> None:
     table = PrintedTable(box=None, pad_edge=False)
-    for title, justify in (("topic", "left"), ("type", "left"), ("count", "right"), ("rate", "right")):
-        table.add_column(title, justify=justify, overflow="fold")  # type: ignore[arg-type]
-    for title in ("first", "last [s]"):
+    for title in ("topic", "type"):
+        table.add_column(title, overflow="fold")
+    for title in ("count", "rate", "first", "last [s]"):
         table.add_column(title, justify="right", no_wrap=True)
     table.add_column("stamps", no_wrap=True)
     table.add_column("places", overflow="fold")

@@ -99,7 +99,7 @@ def read_bag(path: str | Path, topic_map: TopicMap) -> tuple[Demonstration, list
 
 
 def bag_sensor(
-    name: str, path: str, map: str, *, only: Sequence[str] | None = None, speed: float = 1.0
+    file: Path, map: Path, name: str = "bag", only: tuple[str, ...] | None = None, speed: float = 1.0
 ) -> ReplaySensor:
     """A sensor that plays a bag as a topic map says, `speed` times as fast.
 
@@ -107,7 +107,7 @@ def bag_sensor(
     Raises as `read_topic_map`, `read_bag` and `ReplaySensor`.
     """
     topic_map = read_topic_map(map)
-    demonstration, _ = read_bag(path, topic_map)
+    demonstration, _ = read_bag(file, topic_map)
     return ReplaySensor(demonstration, topic_map.channels, only=only, speed=speed, name=name)
 
 
