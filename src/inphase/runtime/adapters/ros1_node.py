@@ -1,4 +1,4 @@
-"""This process as a ROS 1 node: rospy where it is installed, a master that answers, message types by their name.
+"""One process as a ROS 1 node: rospy where it is installed, a master that answers, message types by their name.
 
 rospy is no package of PyPI. It comes with ROS, or on Debian and Ubuntu as `python3-rospy`, and is found at run time.
 A process is one node for as long as it lives: rospy neither leaves a master nor registers again with one that was
@@ -94,7 +94,7 @@ def within(what: str, call: Callable[[], T], seconds: float = WAIT) -> T:
         raise
     except FutureTimeoutError:
         raise OptionError(f"{what}: no answer within {seconds:g} s") from None
-    except Exception as error:  # noqa: BLE001
+    except Exception as error:
         raise OptionError(f"{what}: {error}") from error
 
 
@@ -161,10 +161,9 @@ def subscribe(name: str, topic: str, type: str, take: Callable[[Any], None]) -> 
     return within(name, lambda: ros.Subscriber(topic, message, take, tcp_nodelay=True))
 
 
-def leave(*handles: Any) -> None:
-    """Unregister subscribers and publishers; a master that does not answer is not waited for."""
-    for handle in handles:
-        if handle is not None:
-            thread = threading.Thread(target=handle.unregister, name="inphase ROS: leaving", daemon=True)
-            thread.start()
-            thread.join(WAIT)
+def leave(*endings: Callable[[], object]) -> None:
+    """Unregister what these do; a master that does not answer is not waited for."""
+    for ending in endings:
+        thread = threading.Thread(target=ending, name="inphase ROS: leaving", daemon=True)
+        thread.start()
+        thread.join(WAIT)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, Protocol
 
 from inphase.errors import OptionError
 from inphase.io.mcap_messages import estimate as estimate_text
 from inphase.result import Estimate
-from inphase.runtime.adapters.ros1_node import WAIT, join_ros, service_class, within
+from inphase.runtime.adapters.ros1_node import join_ros, leave, service_class, within
 
 TRIGGER = "std_srvs/Trigger"
 
@@ -44,7 +45,7 @@ class Ros1Services:
         for name, answer in (("reset", self._reset), ("phase", self._phase)):
             service = f"{self._namespace}/{name}"
             try:
-                made = within(service, lambda s=service, a=answer: ros.Service(s, self._trigger, a))
+                made = within(service, partial(ros.Service, service, self._trigger, answer))
             except OptionError:
                 self.stop()
                 raise
@@ -53,8 +54,7 @@ class Ros1Services:
     def stop(self) -> None:
         """Offer them no more."""
         services, self._services = self._services, []
-        for service in services:
-            within("leaving", lambda s=service: s.shutdown("inphase stops"), WAIT)
+        leave(*(service.shutdown for service in services))
 
     def _reset(self, _: Any) -> Any:
         self._interaction.reset()
