@@ -100,7 +100,8 @@ def _check_place(name: str, type: str, field: Field, example: Any) -> None:
     for part in path.split("."):
         there = getattr(value, "__slots__", ())
         if part not in there:
-            raise OptionError(f"{name}: {type} has no {field.place!r}: expected one of {listing(there)}, got {part!r}")
+            expected = f"one of {listing(there)}" if there else "no part of what is no message"
+            raise OptionError(f"{name}: {type} has no {field.place!r}: expected {expected}, got {part!r}")
         value = getattr(value, part)
     if hasattr(value, "_type") or isinstance(value, str):
         kind = getattr(value, "_type", "text")
