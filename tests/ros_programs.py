@@ -103,6 +103,8 @@ def live(topic: str) -> None:
                 say("started")
             elif line == "read\n":
                 say(len(sensor.read()), robot.state() is not None)
+            elif line == "listeners\n":
+                say(robot.listeners)
             elif line == "command\n":
                 robot.command(Command(np.array([clock.now() + 1]), np.zeros((1, 1))))
                 say("commanded")

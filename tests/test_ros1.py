@@ -42,7 +42,6 @@ JOINTS = {"giver_s": "position[shoulder]", "giver_e": "position[elbow]"}
 pytestmark = [
     pytest.mark.filterwarnings("ignore::DeprecationWarning:(rospy|rosgraph|rosmaster|genpy|roslib)"),
     pytest.mark.filterwarnings("ignore:unclosed <socket:ResourceWarning"),
-    pytest.mark.filterwarnings("ignore:Exception ignored.*socket:pytest.PytestUnraisableExceptionWarning"),
 ]
 
 
@@ -117,7 +116,10 @@ def master(tmp_path_factory) -> Iterator[str]:
             until(lambda: answers(os.environ["ROS_MASTER_URI"]))
             yield os.environ["ROS_MASTER_URI"]
             rospy.signal_shutdown("the tests are over")
+    for handler in {*root.handlers, *logging.getLogger("rosout").handlers} - {*before[0]}:
+        handler.close()
     root.handlers[:], root.level = before
+    logging.getLogger("rosout").handlers.clear()
 
 
 @pytest.fixture
@@ -139,11 +141,19 @@ def started(*devices):
             device.stop()
 
 
-def publisher(topic: str, type: str):
-    """A publisher beside the devices, in the same node: over TCP all the same, and somebody listens already."""
-    made = rospy.Publisher(topic, ros1_node.message_class(type), queue_size=0)
-    until(made.get_num_connections)
-    return made
+@pytest.fixture
+def publisher(master) -> Iterator[Callable]:
+    """Makes publishers beside the devices, in the same node: over TCP all the same, and somebody listens already."""
+    made = []
+
+    def make(topic: str, type: str):
+        made.append(rospy.Publisher(topic, ros1_node.message_class(type), queue_size=0))
+        until(made[-1].get_num_connections)
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.unregister()
 
 
 def joint_state(names, positions, stamp: float = 0.0):
@@ -166,7 +176,7 @@ def registered(uri: str) -> list[str]:
     return sorted(n for n in mine if n != "/rosout" and not n.startswith(rospy.get_name()))
 
 
-# ------------------------------------------------------------------------------------------------------ without a master
+# ---------------------------------------------------------------------------------------------------- without a master
 
 
 def test_without_ros_the_package_is_named(monkeypatch):
@@ -254,7 +264,7 @@ def test_a_master_that_listens_and_says_nothing_is_not_waited_for(master, monkey
     monkeypatch.setattr(ros1_node, "WAIT", 0.2)
     with socket.create_server(("127.0.0.1", 0)) as mute:
         monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{mute.getsockname()[1]}")
-        with pytest.raises(OptionError, match="no ROS master answers .*timed out"):
+        with pytest.raises(OptionError, match=r"no ROS master answers .*timed out"):
             Ros1Sensor("arm", "/a", "sensor_msgs/JointState", JOINTS).start(SystemClock())
 
 
@@ -286,7 +296,7 @@ def test_every_message_of_another_process_is_received_as_it_was_sent(topic):
     assert sensor.dropped == 0
 
 
-def test_places_of_several_types_and_stamps(topic):
+def test_places_of_several_types_and_stamps(topic, publisher):
     pose = Ros1Sensor(
         "hand", topic + "/pose", "geometry_msgs/PoseStamped", {"x": "pose.position.x", "qw": "pose.orientation.w"}
     )
@@ -304,7 +314,7 @@ def test_places_of_several_types_and_stamps(topic):
         assert (sample.values.tolist(), sample.stamp, sample.received) == ([7.0, 9.0], 101.0, 101.0)
 
 
-def test_what_a_message_has_not_is_nan_and_named(topic):
+def test_what_a_message_has_not_is_nan_and_named(topic, publisher):
     sensor = Ros1Sensor("arm", topic, "sensor_msgs/JointState", {**JOINTS, "typo": "position[ellbow]"})
     with started(sensor):
         assert sensor.unseen == ("giver_s", "giver_e", "typo")
@@ -320,7 +330,7 @@ def test_what_a_message_has_not_is_nan_and_named(topic):
         assert sensor.unseen == ("typo",)
 
 
-def test_of_more_than_may_wait_the_newest_are_kept_and_the_others_counted(topic):
+def test_of_more_than_may_wait_the_newest_are_kept_and_the_others_counted(topic, publisher):
     sensor = Ros1Sensor("arm", topic, "sensor_msgs/JointState", JOINTS, capacity=5)
     with started(sensor):
         made = publisher(topic, "sensor_msgs/JointState")
@@ -354,7 +364,7 @@ def test_a_type_defined_otherwise_is_not_read_and_disturbs_no_other(topic):
 # -------------------------------------------------------------------------------------------------------------- robot
 
 
-def test_a_state_is_put_together_and_is_none_once_a_joint_is_silent(topic):
+def test_a_state_is_put_together_and_is_none_once_a_joint_is_silent(topic, publisher):
     robot = Ros1Robot("robot", {"a": "elbow", "b": "finger"}, topic + "/command", topic, silent_after=0.5)
     with started(robot) as clock:
         made = publisher(topic, "sensor_msgs/JointState")
@@ -380,11 +390,11 @@ def test_a_state_is_put_together_and_is_none_once_a_joint_is_silent(topic):
 
 
 @contextmanager
-def wire(topic: str):
+def wire(robot: Ros1Robot, topic: str):
     """The trajectories that come over the wire."""
     come: list = []
     subscriber = rospy.Subscriber(topic, ros1_node.message_class("trajectory_msgs/JointTrajectory"), come.append)
-    until(subscriber.get_num_connections)
+    until(lambda: subscriber.get_num_connections() and robot.listeners)
     yield come
     subscriber.unregister()
 
@@ -402,7 +412,7 @@ def wire(topic: str):
 )
 def test_a_command_on_the_wire_is_due_when_the_loop_says(topic, after, sent):
     robot = Ros1Robot("robot", {"grip": "finger", "turn": "wrist"}, topic)
-    with started(robot) as clock, wire(topic) as come:
+    with started(robot) as clock, wire(robot, topic) as come:
         positions = np.arange(2.0 * len(after)).reshape(-1, 2)
         before = rospy.Time.now()
         robot.command(Command(clock.now() + np.array(after), positions))
@@ -416,7 +426,7 @@ def test_a_command_on_the_wire_is_due_when_the_loop_says(topic, after, sent):
 
 def test_without_a_stamp_a_command_begins_when_it_arrives(topic):
     robot = Ros1Robot("robot", ["elbow"], topic, stamped=False)
-    with started(robot) as clock, wire(topic) as come:
+    with started(robot) as clock, wire(robot, topic) as come:
         robot.command(Command(np.array([clock.now() + 1.0]), np.zeros((1, 1))))
         until(lambda: come)
     assert come[0].header.stamp == rospy.Time()
@@ -479,7 +489,7 @@ def test_services_tell_the_phase_and_begin_anew(master):
 # ------------------------------------------------------------------------------------------------------------ together
 
 
-def test_two_sensors_and_a_robot_share_a_topic_and_a_stop_unregisters(master, topic):
+def test_two_sensors_and_a_robot_share_a_topic_and_a_stop_unregisters(master, topic, publisher):
     first, second = (Ros1Sensor(name, topic, "sensor_msgs/JointState", JOINTS) for name in ("first", "second"))
     robot = Ros1Robot("robot", ["elbow"], topic + "/command", topic)
     with started(first, second, robot):
@@ -487,20 +497,19 @@ def test_two_sensors_and_a_robot_share_a_topic_and_a_stop_unregisters(master, to
         made.publish(joint_state(["shoulder", "elbow"], [1.0, 2.0]))
         assert len(collected(first, 1)) == len(collected(second, 1)) == 1
         until(robot.state)
-        assert registered(master) == sorted([topic, topic, topic + "/command"])  # as publisher and subscriber
+        assert registered(master) == sorted([topic, topic, topic + "/command"])  # published and subscribed to
         first.stop()
         made.publish(joint_state(["shoulder", "elbow"], [3.0, 4.0]))
         collected(second, 1)
         assert first.read() == []
         made.unregister()
     assert registered(master) == []
-    with started(first) as _:  # and may be started once more
-        with program("publish", topic, 3, 100.0):
-            assert len(collected(first, 3)) == 3
+    with started(first), program("publish", topic, 3, 100.0):  # and may be started once more
+        assert len(collected(first, 3)) == 3
     assert registered(master) == []
 
 
-def test_from_joint_states_to_joint_trajectories(topic, rng):
+def test_from_joint_states_to_joint_trajectories(topic, rng, publisher):
     """A partner in another process, whom a session follows, and what the robot is sent arrives in a third."""
     model = taught(dataset(rng))
     session, clock = model.session(seed=0), SystemClock()
@@ -515,6 +524,7 @@ def test_from_joint_states_to_joint_trajectories(topic, rng):
     try:
         with program("collect", topic + "/command") as receiver:
             assert receiver.stdout.readline() == "connected\n"
+            until(lambda: robot.listeners == 1)
             made = publisher(topic, "sensor_msgs/JointState")
             for time_, row in zip(times, values, strict=True):
                 made.publish(joint_state(["a", "b"], row[:2].tolist(), stamp=FIRST_STAMP + time_))
@@ -576,32 +586,37 @@ def test_when_the_master_dies_nothing_hangs_and_a_new_start_finds_the_next(anoth
 
 def test_what_is_connected_needs_no_master(another):
     options = {"env": another, "stderr": subprocess.DEVNULL}
-    with program("live", "/joints", **options) as live:
-        with own_master(another["ROS_MASTER_URI"]) as dying:
-            with program("publish", "/joints", 100_000, 100.0, **options):
-                assert told(live, "start") == "started"
-                until(lambda: told(live, "read").endswith("True"))
-                dying.kill()
-                dying.wait()
-                told(live, "read")
-                for _ in range(3):
-                    until(lambda: told(live, "read").endswith("True"))
-                    time.sleep(0.2)
+    with (
+        own_master(another["ROS_MASTER_URI"]) as dying,
+        program("live", "/joints", **options) as live,
+        program("publish", "/joints", 100_000, 100.0, **options),
+    ):
+        assert told(live, "start") == "started"
+        until(lambda: told(live, "read").endswith("True"))
+        dying.kill()
+        dying.wait()
+        told(live, "read")
+        until(lambda: told(live, "read") != "0 True", 10.0)
+        assert told(live, "read").endswith("True")
 
 
 @pytest.mark.parametrize("ending", ["leave", "stop", "shut down"])
 def test_a_program_ends_however_it_left_ros(another, ending):
     options = {"env": another, "stderr": subprocess.DEVNULL}
-    with own_master(another["ROS_MASTER_URI"]), program("collect", "/live/command", **options) as receiver:
-        with program("live", "/joints", **options) as live:
-            assert told(live, "start") == "started"
-            assert receiver.stdout.readline() == "connected\n"
+    with (
+        own_master(another["ROS_MASTER_URI"]),
+        program("collect", "/live/command", **options) as receiver,
+        program("live", "/joints", **options) as live,
+    ):
+        assert told(live, "start") == "started"
+        assert receiver.stdout.readline() == "connected\n"
+        until(lambda: told(live, "listeners") == "1")
+        assert told(live, "command") == "commanded"
+        receiver.stdout.readline()
+        told(live, ending)
+        if ending == "shut down":
             assert told(live, "command") == "commanded"
-            receiver.stdout.readline()
-            told(live, ending)
-            if ending == "shut down":
-                assert told(live, "command") == "commanded"
-                assert told(live, "read") == "0 False"
-                assert "was shut down" in told(live, "start")
-            live.stdin.close()
-            assert live.wait(20) == 0
+            assert told(live, "read") == "0 False"
+            assert "was shut down" in told(live, "start")
+        live.stdin.close()
+        assert live.wait(20) == 0

@@ -14,8 +14,7 @@ import sys
 import threading
 import xmlrpc.client
 from collections.abc import Callable
-from concurrent.futures import Future
-from concurrent.futures import TimeoutError as FutureTimeoutError
+from concurrent.futures import Future, wait
 from http.client import HTTPConnection
 from importlib import import_module
 from typing import Any, TypeVar
@@ -88,14 +87,13 @@ def within(what: str, call: Callable[[], T], seconds: float = WAIT) -> T:
             answer.set_exception(error)
 
     threading.Thread(target=run, name=f"inphase ROS: {what}", daemon=True).start()
-    try:
-        return answer.result(seconds)
-    except OptionError:
-        raise
-    except FutureTimeoutError:
-        raise OptionError(f"{what}: no answer within {seconds:g} s") from None
-    except Exception as error:
+    wait([answer], seconds)
+    if not answer.done():
+        raise OptionError(f"{what}: no answer within {seconds:g} s")
+    error = answer.exception()
+    if error is not None:
         raise OptionError(f"{what}: {error}") from error
+    return answer.result()
 
 
 class Master:
@@ -121,7 +119,7 @@ class Master:
         # Twice the limit: where a name is looked up in vain, connecting alone may take longer than that of the socket.
         advice = "start one with `roscore`, or set ROS_MASTER_URI to where it runs"
         try:
-            return within("asking it", ask, 2 * WAIT)
+            return within(method, ask, 2 * WAIT)
         except OptionError as error:
             reason = error.__cause__ or error
             raise OptionError(f"no ROS master answers at {self.uri} ({reason}); {advice}") from None

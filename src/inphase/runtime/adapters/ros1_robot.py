@@ -116,6 +116,11 @@ class Ros1Robot:
         self._subscriber = self._publisher = None
         self._latest = np.full((3, len(self.joints)), np.nan)
 
+    @property
+    def listeners(self) -> int:
+        """How many nodes take its commands."""
+        return int(self._publisher.get_num_connections()) if self._publisher is not None else 0
+
     def _take(self, message: Any) -> None:
         clock = self._clock
         if clock is None:

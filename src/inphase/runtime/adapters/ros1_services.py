@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from inphase.errors import OptionError
 from inphase.io.mcap_messages import estimate as estimate_text
@@ -13,6 +13,7 @@ from inphase.runtime.adapters.ros1_node import join_ros, leave, service_class, w
 TRIGGER = "std_srvs/Trigger"
 
 
+@runtime_checkable
 class Interaction(Protocol):
     """What a loop offers to all threads."""
 
