@@ -30,6 +30,14 @@ from inphase.runtime.adapters import ros1_node
 from inphase.runtime.adapters.ros1_robot import Ros1Robot
 from inphase.runtime.adapters.ros1_sensor import Ros1Sensor
 from inphase.runtime.adapters.ros1_services import Ros1Services
+from inphase.runtime.configuration.devices import make_device
+from inphase.runtime.configuration.section import Section
+from inphase.runtime.live import Output
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 try:
     import rospy
@@ -234,6 +242,49 @@ def test_other_values_that_do_not_fit_are_named(master):
         Ros1Robot("robot", ["elbow"], "/c", shortest=-1.0)
 
 
+def test_tables_of_a_configuration_make_them(master, tmp_path):
+    """The keywords are what TOML can say, and what is wrong is told with its line."""
+    text = """
+[sensors.partner]
+device = "ros1"
+topic = "/partner/joint_states"
+type = "sensor_msgs/JointState"
+fields = { reach = "position[0]", lift = "position[lift_joint]" }
+units = { "*" = "m" }
+
+[robot]
+device = "ros1"
+joints = { grip = "finger", turn = "wrist" }
+command = "/arm/command"
+state = "/arm/joint_states"
+silent_after = 0.2
+
+[outputs.services]
+device = "ros1"
+namespace = "handover"
+"""
+    makers = [{"ros1": make} for make in (Ros1Sensor, Ros1Robot, Ros1Services)]
+
+    def devices():
+        root = Section("live.toml", text, tmp_path, tomllib.loads(text))
+        tables = (("sensors", "partner"), ("robot",), ("outputs", "services"))
+        for path, known in zip(tables, makers, strict=True):
+            section = root
+            for part in path:
+                section = section.section(part)
+            yield make_device(section, known, name=path[-1], loop=Loop())
+
+    sensor, robot, services = devices()
+    assert sensor.signals == (Signal("reach", "m"), Signal("lift", "m"))
+    assert (robot.name, robot.joints) == ("robot", ("finger", "wrist"))
+    assert isinstance(services, Output)
+    text = text.replace("position[0]", "positions[0]")
+    with pytest.raises(
+        OptionError, match=r"line \d+: .*has no 'positions\[0\]': expected one of header, name, position"
+    ):
+        next(devices())
+
+
 def test_signals_are_known_before_the_start(master):
     sensor = Ros1Sensor("arm", "/a", "sensor_msgs/JointState", JOINTS, units={"giver_?": "rad"})
     robot = Ros1Robot("robot", {"grip": "finger"}, "/c", units={"grip": "m"})
@@ -321,10 +372,10 @@ def test_what_a_message_has_not_is_nan_and_named(topic, publisher):
         made = publisher(topic, "sensor_msgs/JointState")
         made.publish(joint_state(["elbow", "shoulder"], [math.nan, 1.0]))
         made.publish(joint_state(["elbow"], [2.0]))
-        made.publish(joint_state(["elbow", "shoulder"], [3.0]))  # fewer positions than names
+        made.publish(joint_state(["elbow", "shoulder"], [3.0]))  # whose?
         samples = collected(sensor, 3)
         np.testing.assert_array_equal(
-            [s.values for s in samples], [[1.0, np.nan, np.nan], [np.nan, 2.0, np.nan], [np.nan, 3.0, np.nan]]
+            [s.values for s in samples], [[1.0, np.nan, np.nan], [np.nan, 2.0, np.nan], [np.nan] * 3]
         )
         assert [s.stamp for s in samples] == [100.0] * 3  # a header that was not set is no stamp
         assert sensor.unseen == ("typo",)

@@ -14,7 +14,7 @@ import numpy as np
 
 from inphase.channels import check_unique, spread
 from inphase.errors import OptionError, listing
-from inphase.runtime.adapters.message_fields import stamp_of
+from inphase.runtime.adapters.message_fields import Field, stamp_of
 from inphase.runtime.adapters.ros1_node import join_ros, leave, message_class, subscribe, within
 from inphase.runtime.clock import Clock
 from inphase.runtime.device import Command, Sample, Signal
@@ -64,6 +64,7 @@ class Ros1Robot:
             shortest,
         )
         self._trajectory, self._point, _ = (message_class(type) for type in (TRAJECTORY, POINT, STATE))
+        self._places = [Field(f"position[{joint}]") for joint in self.joints]
         self._taking = threading.Lock()
         self._latest = np.full((3, len(self.joints)), np.nan)  # position, stamp, received; replaced, never changed
         self._clock: Clock | None = None
@@ -126,10 +127,9 @@ class Ros1Robot:
         if clock is None:
             return
         received, stamp = clock.now(), stamp_of(message)
-        by_joint = dict(zip(message.name, message.position, strict=False))  # some state velocities alone
         with self._taking:
             latest = self._latest.copy()
-            for i, joint in enumerate(self.joints):
-                if np.isfinite(position := by_joint.get(joint, np.nan)):
+            for i, place in enumerate(self._places):
+                if np.isfinite(position := place.of(message)):
                     latest[:, i] = position, received if stamp is None else stamp, received
             self._latest = latest

@@ -34,8 +34,8 @@ class Ros1Services:
     Raises OptionError where ROS is not installed.
     """
 
-    def __init__(self, interaction: Interaction, namespace: str = "inphase") -> None:
-        self._interaction, self._namespace = interaction, namespace.rstrip("/")
+    def __init__(self, loop: Interaction, namespace: str = "inphase") -> None:
+        self._loop, self._namespace = loop, namespace.rstrip("/")
         self._trigger = service_class(TRIGGER)
         self._services: list[Any] = []
 
@@ -58,11 +58,11 @@ class Ros1Services:
         leave(*(service.shutdown for service in services))
 
     def _reset(self, _: Any) -> Any:
-        self._interaction.reset()
+        self._loop.reset()
         return self._trigger._response_class(True, "a new interaction begins with the next cycle")
 
     def _phase(self, _: Any) -> Any:
-        estimate = self._interaction.estimate
+        estimate = self._loop.estimate
         if estimate is None:
             return self._trigger._response_class(False, "nothing was observed yet")
         return self._trigger._response_class(True, estimate_text(estimate))
