@@ -98,7 +98,7 @@ class Ros1Robot:
                 f"got {command.positions.shape[1]}"
             )
         clock, ros, publisher = self._clock, self._ros, self._publisher
-        if clock is None or publisher is None or ros.is_shutdown():
+        if clock is None or publisher is None:
             return
         message = self._trajectory(joint_names=list(self.joints))
         stamp, due = ros.Time.now(), command.times - clock.now()
