@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Float
@@ -97,15 +97,29 @@ def make_device(section: Section, makers: Mapping[str, Maker], **known: Any) -> 
     file does not say, as the model: those get it that ask for it by a parameter of that name. Raises OptionError with
     the line for an unknown device, one that wants what is not there, or entries that do not fit.
     """
-    others = {point.name: point for point in entry_points(group=GROUP)}
     device = section.get("device", str)
-    if device in makers:
-        make = makers[device]
-    elif device in others:
-        make = others[device].load()
-    else:
-        raise section.fail(f"there is no device {device!r}; one of {listing([*makers, *others])}", "device")
+    make = _maker(section, device, makers)
     wanted = [name for name in known if name in inspect.signature(make).parameters]
     if any(known[name] is None for name in wanted):
         raise section.fail(f"{device} needs a model: expected model = a file, at the top, got none", "device")
-    return section.call(make, ("device", "clock"), **{name: known[name] for name in wanted})
+    try:
+        return section.call(make, ("device",), **{name: known[name] for name in wanted})
+    except (ImportError, OSError) as error:  # a port that is not there, a driver that is not installed
+        raise section.fail(f"{device} cannot be made: {error}", "device") from error
+
+
+def _maker(section: Section, device: str, makers: Mapping[str, Maker]) -> Maker:
+    if device in makers:
+        return makers[device]
+    others = {point.name: point for point in entry_points(group=GROUP)}
+    if device not in others:
+        raise section.fail(
+            f"there is no device {device!r}; one of {listing(dict.fromkeys([*makers, *others]))}", "device"
+        )
+    try:
+        make = others[device].load()
+    except (ImportError, AttributeError) as error:
+        raise section.fail(f"{device}, of {source}, cannot be loaded: {error}", "device") from error
+    if not callable(make):
+        raise section.fail(f"{device}: expected {source} to be a class or function, got {make!r}", "device")
+    return cast(Maker, make)
