@@ -52,6 +52,8 @@ def simulated_partner(
     noise: float = 0.01,
 ) -> Sensor:
     """A partner who moves as the model says partners do."""
+    if seed < 0:
+        raise OptionError(f"expected a seed >= 0, got {seed}")
     return SimulatedPartner(model, seed, rate=rate, tempo=tempo, pauses=pauses, noise=noise, name=name)
 
 
@@ -113,13 +115,13 @@ def _maker(section: Section, device: str, makers: Mapping[str, Maker]) -> Maker:
         return makers[device]
     others = {point.name: point for point in entry_points(group=GROUP)}
     if device not in others:
-        raise section.fail(
-            f"there is no device {device!r}; one of {listing(dict.fromkeys([*makers, *others]))}", "device"
-        )
+        names = listing(dict.fromkeys([*makers, *others]))
+        raise section.fail(f"there is no device {device!r}; one of {names}", "device")
+    source = others[device].value
     try:
         make = others[device].load()
     except (ImportError, AttributeError) as error:
         raise section.fail(f"{device}, of {source}, cannot be loaded: {error}", "device") from error
     if not callable(make):
-        raise section.fail(f"{device}: expected {source} to be a class or function, got {make!r}", "device")
+        raise section.fail(f"{device}: expected a class or function in {source}, got {make!r}", "device")
     return cast(Maker, make)

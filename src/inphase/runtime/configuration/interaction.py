@@ -145,6 +145,8 @@ class Configuration:
         name, seed = section.get("name", str, RECOMMENDED), section.get("seed", int, 0)
         if name not in FILTERS:
             raise section.fail(f"there is no filter {name!r}; one of {listing(FILTERS)}", "name")
+        if seed < 0:
+            raise section.fail(f"expected a seed >= 0, got {seed}", "seed")
         return name, seed, {key: section.get(key, Any) for key in section if key not in ("name", "seed")}
 
 

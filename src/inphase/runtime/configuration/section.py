@@ -95,7 +95,7 @@ class Section:
             if parameter.default is parameter.empty and name not in entries:
                 raise self.fail(f"expected {name} = {words(hints.get(name, Any))}, got none")
         values = {key: self._convert(key, hints.get(key, Any) if key in known else Any) for key in entries}
-        with self.naming(entries):
+        with self.naming([*self._table]):
             return make(**values, **given)
 
     @contextmanager
@@ -121,13 +121,13 @@ class Section:
         return self.fail(message.removeprefix(f"{self.path[-1]}: ") if self.path else message, *keys)
 
     def _named(self, message: str, keys: Sequence[str]) -> tuple[str, ...]:
-        """Which of these entries a message is about; or which name in one that is a table."""
+        """Which of these entries a message is about; or which name in one that is a table or a list."""
         about = EXPECTED.split(message)[0]
         for key in keys:
-            table = self._table.get(key)
-            for name in table if isinstance(table, Mapping) else ():
-                if repr(name) in about:
-                    return key, name
+            inside = self._table.get(key)
+            for name in inside if isinstance(inside, (Mapping, list)) else ():
+                if isinstance(name, str) and repr(name) in about:
+                    return (key, name) if isinstance(inside, Mapping) else (key,)
         found = ((re.search(rf"(?<!\w){re.escape(key)}(?!\w)", about), key) for key in keys)
         return tuple(key for _, key in sorted((at.start(), key) for at, key in found if at)[:1])
 
