@@ -1,20 +1,23 @@
 """The file of an interaction: what it says is what is run, and every mistake in it is named with its line."""
 
+# ruff: noqa: E501 - of a table of mistakes, a row is a line
+
 from __future__ import annotations
 
 import contextlib
 import enum
+import functools
 import importlib
 import re
 import string
 import sys
-import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import hypothesis
 import hypothesis.strategies as st
 import numpy as np
 import pytest
@@ -26,7 +29,7 @@ import inphase
 from inphase.errors import DataError, OptionError
 from inphase.io.csv import write_csv
 from inphase.runtime import Clock, Command, FakeClock, Sample, Signal
-from inphase.runtime.configuration import Configuration, no_limits, read_configuration
+from inphase.runtime.configuration import Configuration, no_limits, read_configuration, toml_lines
 from inphase.runtime.configuration.section import Section
 from inphase.runtime.configuration.toml_lines import line_of
 from inphase.runtime.devices import ReplaySensor, SimulatedPartner, SimulatedRobot
@@ -240,7 +243,7 @@ MISTAKES = {
     "a text for a limit": ("low = -2", 'low = "-2"', "robot.limits.*.low", "expected a number, got '-2'"),
     "a retreat that is a number": ("{ grip = 0.5, turn = 0.25 }", "1", "safety.retreat", "a table of a number by name, got 1"),
     # values
-    "no rate": ("sense = 60", "sense = 0", "rates.sense", "rates: expected|expected sense > 0"),
+    "no rate": ("sense = 60", "sense = 0", "rates.sense", "expected sense > 0"),
     "a rate without end": ("sense = 60", "sense = inf", "rates.sense", "expected sense > 0"),
     "a rate that is no number": ("sense = 60", "sense = nan", "rates.sense", "expected sense > 0"),
     "few samples": ("samples = 20", "samples = 1", "response.samples", "expected samples >= 2, got 1"),
@@ -275,7 +278,7 @@ MISTAKES = {
     # limits and retreat
     "low above high": ("low = -2", "low = 3", "robot.limits.*", "expected low <= high of grip, got 3 and 2"),
     "low above high by the last": ("acceleration = 30", "high = -5", "robot.limits.turn", "low <= high of turn, got -2 and -5"),
-    "a limit that is no number": ("acceleration = 30", "acceleration = nan", "robot.limits.turn", "an acceleration|acceleration > 0 of turn"),
+    "a limit that is no number": ("acceleration = 30", "acceleration = nan", "robot.limits.turn", "acceleration > 0 of turn, got nan"),
     "no velocity": ("velocity = 1.5", "velocity = 0", "robot.limits.*", "expected a velocity > 0 of grip, got 0"),
     "a retreat without a pose": ("retreat = {", "# retreat = {", "safety.stale_sensors", "expected a pose to retreat to"),
     "a retreat without a velocity": ("velocity = 1.5", "", "safety.stale_sensors", "a finite velocity limit of every"),
@@ -341,3 +344,402 @@ def test_a_mistake_is_told_with_its_line_and_what_is_allowed(what, read):
     where = f"live.toml, line {place(text, path)}: " + (f"{path}: " if path else "")
     assert message.startswith(where), (message, where)
     assert re.search(said, message.removeprefix(where)), message
+
+
+def test_what_is_no_toml_is_named_with_its_line(folder):
+    path = folder / "live.toml"
+    for text, said in (("a = 1\nb = \n", "line 2: expected TOML"), ("\n\n[robot\n", "line 3: expected TOML")):
+        path.write_text(text)
+        with pytest.raises(DataError, match=rf"^{re.escape(str(path))}, {said}"):
+            read_configuration(path)
+    with pytest.raises(DataError, match=r"none\.toml: cannot be read"):
+        read_configuration(folder / "none.toml")
+
+
+def test_a_long_value_is_not_said_whole(read):
+    with pytest.raises(OptionError) as caught:
+        read(GOOD.replace("alpha = 0.7", f"alpha = {list(range(1000))}"))
+    assert len(str(caught.value)) < 200
+
+
+# ------------------------------------------------------------------------------------------------ random corruptions
+
+
+PIECES = st.sampled_from(
+    [*"=[]{}\"'\n.,#\0\r\x85é0", *"-1 nan -inf 1e308 1e400 true [] {} [[1]] '*' 1979-05-27 hold own grip".split(), "9" * 25, "a = 3\n"]
+)  # fmt: skip
+
+
+@given(
+    changes=st.lists(
+        st.tuples(st.floats(0, 1), st.integers(0, 12), st.one_of(PIECES, st.text(max_size=3))), min_size=1, max_size=3
+    )
+)
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_whatever_is_written_is_read_or_refused(changes, folder):
+    text = GOOD
+    for where, length, piece in changes:
+        at = round(where * len(text))
+        text = text[:at] + piece + text[at + length :]
+    path = folder / "corrupt.toml"
+    path.write_bytes(text.encode("utf-8", "surrogatepass"))
+    with contextlib.suppress(OptionError, DataError):
+        read_configuration(path).loop(FakeClock())
+
+
+VALUES = ["-1", "nan", "inf", "9" * 25, "true", '"x"', "[]", "[1]", '["x"]', "[[1, -2]]", "{ x = 1 }", '{ "*" = nan }']
+VALUES += ['""', '{ "*" = {} }', "07:32:00"]
+ENTRIES = [i for i, line in enumerate(GOOD.splitlines()) if "=" in line]
+
+
+def refusal(read: Read, text: str) -> str | None:
+    try:
+        build(read, text)
+    except OptionError as error:
+        return str(error)
+    return None
+
+
+@pytest.mark.parametrize("value", VALUES)
+def test_whatever_an_entry_is_it_is_taken_or_refused_where_it_stands(value, read):
+    lines = GOOD.splitlines()
+    for i in ENTRIES:
+        key = lines[i].split("=")[0].strip()
+        text = "\n".join([*lines[:i], f"{key} = {value}", *lines[i + 1 :]])
+        said = refusal(read, text)
+        if said is not None:
+            table = next(j for j in range(i, -1, -1) if lines[j].startswith("[") or j == 0)
+            line = int(re.match(r"live\.toml, line (\d+): ", said)[1])
+            # What does not go together with another entry may be told at that one.
+            assert line in (i + 1, table + 1) or key in ("low", "high", "velocity"), (lines[i], value, said)
+
+
+# ------------------------------------------------------------------------------------------------------ which line
+
+
+KEYS = st.one_of(
+    st.text(string.ascii_letters + string.digits + "-_", min_size=1, max_size=3),
+    st.text(st.sampled_from("ab.='[]# \"\\\té"), max_size=4),
+)
+
+
+def written(draw: st.DrawFn, key: str) -> str:
+    """A key as TOML may have it."""
+    forms = ['"' + key.replace("\\", "\\\\").replace('"', '\\"').replace("\t", "\\t") + '"']
+    forms += [f"'{key}'"] if "'" not in key else []
+    forms += [key] if re.fullmatch(r"[A-Za-z0-9_-]+", key) else []
+    forms += ['"' + "".join(f"\\u{ord(letter):04x}" for letter in key) + '"']
+    return draw(st.sampled_from(forms))
+
+
+CONFUSING = [
+    *("1", '"[a]"', "'b = 1'", '"#"', '"""\n[a]\nb = 1\n"""', "'''\n[a]\n#'''", "{ a = 1, b = { 'c' = \"}\" } }"),
+    *(
+        "[ # ]\n1, [2], # b = 2\n]",
+        '"""a\\"""" # "',
+        '"""x"""""',
+        "''''''",
+        '""',
+        "''",
+        '"\\\\"',
+        "[\n'''\n]''', ]",
+        "0x1F",
+    ),
+]
+
+
+@st.composite
+def documents(draw: st.DrawFn) -> tuple[str, list[tuple[int, tuple[str, ...]]]]:
+    """A TOML text, and every header and entry in it as (line, path)."""
+    text, told, taken = "", list[tuple[int, tuple[str, ...]]](), set[tuple[str, ...]]()
+
+    def fresh(path: tuple[str, ...]) -> bool:
+        """Whether that path may be defined: nothing of it or within it is."""
+        free = all(path[: len(other)] != other and other[: len(path)] != path for other in taken)
+        taken.add(path) if free else None
+        return free
+
+    def dotted(keys: Sequence[str]) -> str:
+        return draw(st.sampled_from([".", " . ", "\t."])).join(written(draw, key) for key in keys)
+
+    for table in [(), *draw(st.lists(st.lists(KEYS, min_size=1, max_size=3).map(tuple), max_size=4))]:
+        entries = draw(st.lists(st.lists(KEYS, min_size=1, max_size=2).map(tuple), max_size=3))
+        if table:
+            if not fresh((*table, "\0")):  # no other header may be of it
+                continue
+            taken.discard((*table, "\0"))
+            taken.add(table)
+            array = draw(st.booleans())
+            line = ("[[{}]]" if array else "[{}]").format(draw(st.sampled_from(["", " "])) + dotted(table))
+            told.append((text.count("\n") + 1, table))
+            text += draw(st.sampled_from(["", "  "])) + line + draw(st.sampled_from(["", " # [x]"])) + "\n"
+        inside = set[tuple[str, ...]]()
+        for entry in entries:
+            if any(entry[: len(o)] == o or o[: len(entry)] == entry for o in inside):
+                continue
+            if not table and any((*table, *entry)[:1] == o[:1] for o in taken):
+                continue
+            inside.add(entry)
+            text += draw(st.sampled_from(["", "\n", "# a = 1\n", "\t"]))
+            told.append((text.count("\n") + 1, (*table, *entry)))
+            text += f"{dotted(entry)} = {draw(st.sampled_from(CONFUSING))}"
+            text += draw(st.sampled_from(["\n", " # b = 2\n", " \t\n"]))
+        if not table:
+            taken |= {entry[:1] for entry in inside}
+    return text, told
+
+
+def plainly(told: Sequence[tuple[int, tuple[str, ...]]], path: Sequence[str]) -> int:
+    """The line of that path: its own, else the first of what is in it, else that of what it is in."""
+    for length in range(len(path), 0, -1):
+        beginning = tuple(path[:length])
+        own = [line for line, found in told if found == beginning]
+        deeper = [line for line, found in told if found[:length] == beginning]
+        if own or deeper:
+            return (own or deeper)[0]
+    return 1
+
+
+@given(documents(), st.data())
+@settings(max_examples=100)
+def test_the_line_is_that_on_which_a_key_was_written(document, data):
+    text, told = document
+    try:
+        toml_lines.tomllib.loads(text)
+    except ValueError:  # a table that is defined twice in some way
+        hypothesis.reject()
+    paths = [path for _, path in told] + [("a",), ("nowhere",), ()]
+    paths += [path[:-1] for path in paths] + [(*path, "a") for path in paths]
+    for ending in ("\n", "\r\n"):
+        for path in data.draw(st.permutations(paths)):
+            assert line_of(text.replace("\n", ending), path) == plainly(told, path), path
+
+
+def test_a_line_is_found_in_whatever_is_no_toml():
+    for text in ("", "\n", "[", "= 1", "a = '''", 'a = """', "a = [", "[a\nb = 1", "\0", "a =", "a.=1\nb = 1"):
+        assert 1 <= line_of(text, ("b",)) <= text.count("\n") + 1
+    assert line_of("a = 1 \u2028\x0c\n# \x85\nb = 1", ("b",)) == 3  # only a new line begins one
+
+
+# ------------------------------------------------------------------------------------------------ devices of others
+
+
+class Glove:
+    """A sensor of one's own, that notes what it was made with."""
+
+    signals = (Signal("reach", "m"), Signal("lift", "m"))
+
+    def __init__(self, name: str, port: str = "/dev/null", **options: Any) -> None:
+        self.name, self.port, self.options = name, port, options
+
+    def start(self, clock: Clock) -> None: ...
+
+    def read(self) -> list[Sample]:
+        return []
+
+    def stop(self) -> None: ...
+
+
+class Arm(SimulatedRobot):
+    def __init__(self, name: str, model: inphase.Model, weights: Float[np.ndarray, " D"]) -> None:
+        super().__init__([Signal(n, UNITS[n]) for n in model.controlled], weights, name=name)
+
+
+class Colour(enum.Enum):
+    RED = "red"
+    BLUE = "blue"
+
+
+@pytest.fixture
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A package that offers devices, as pip would leave it."""
+    information = tmp_path / "gloves-1.0.dist-info"
+    information.mkdir()
+    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: gloves\nVersion: 1.0\n")
+    (information / "entry_points.txt").write_text(
+        "[inphase.devices]\nglove = gloves:make\nbroken = gloves:nothing\nabsent = no_gloves:make\nnumber = gloves:NUMBER\n"
+        "wall = gloves:wall\nunplugged = gloves:unplugged\nsimulated_partner = gloves:unplugged\n"
+    )
+    (tmp_path / "gloves.py").write_text(
+        "from test_configuration import Glove\n\nNUMBER = 3\n\n\n"
+        "def make(name: str, port: str, rate: float = 60.0):\n    return Glove(name, port, rate=rate)\n\n\n"
+        "def wall():\n    return object()\n\n\n"
+        "def unplugged():\n    raise FileNotFoundError(2, 'No such file or directory', '/dev/ttyUSB7')\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    importlib.invalidate_caches()
+    yield
+    sys.modules.pop("gloves", None)
+
+
+def glove(rest: str, device: str = "glove") -> str:
+    return GOOD.replace(SIMULATED, f'device = "{device}"\n{rest}\n')
+
+
+def test_a_device_of_a_script_is_made_by_its_name(read):
+    (made,) = read(glove('port = "usb"\ngain = { a = [1, "b"] }'), {"glove": Glove}).sensors()
+    assert (made.name, made.port, made.options) == ("hand", "usb", {"gain": {"a": [1, "b"]}})
+    text = GOOD.replace('device = "simulated_robot"', 'device = "arm"\nweights = [1, 2.5]')
+    text = re.sub(r"home = .*\ntime_constant = .*\n", "", text)
+    robot = read(text, {"arm": Arm}).robot()
+    robot.start(FakeClock())
+    assert robot.state().values.tolist() == [1.0, 2.5]
+    with pytest.raises(OptionError, match=r"line \d+: robot\.weights: expected a list of numbers, got 'many'"):
+        read(text.replace("[1, 2.5]", "'many'"), {"arm": Arm}).robot()
+    with pytest.raises(OptionError, match=r"robot\.device: arm needs a model: expected model = a file"):
+        read(text.replace('model = "walk.inphase"', ""), {"arm": Arm}).robot()
+
+
+def test_a_device_of_a_package_is_made_by_its_name(read, installed):
+    (made,) = read(glove('port = "usb"\nrate = 30')).sensors()
+    assert (made.port, made.options) == ("usb", {"rate": 30.0})
+    build(read, glove('port = "usb"'))
+
+
+@pytest.mark.parametrize(
+    ("rest", "device", "said"),
+    [
+        ("port = 3", "glove", r"line 20: sensors\.hand\.port: expected a text, got 3$"),
+        ("", "glove", r"line 18: sensors\.hand: expected port = a text, got none$"),
+        ("", "mitten", r"line 19: sensors\.hand\.device: .*'mitten'; one of replay, .*glove, .*unplugged$"),
+        ("", "broken", r"line 19: sensors\.hand\.device: broken, of gloves:nothing, cannot be loaded: .*'nothing'"),
+        ("", "absent", r"line 19: sensors\.hand\.device: absent, of no_gloves:make, cannot be loaded: No module named"),
+        ("", "number", r"line 19: sensors\.hand\.device: .* a class or function in gloves:NUMBER, got 3$"),
+        (
+            "",
+            "wall",
+            r"line 19: sensors\.hand\.device: expected a sensor, got <object .*, which has no name, signals, s",
+        ),
+        ("", "unplugged", r"line 19: .*device: unplugged cannot be made: .*No such file or directory: '/dev/ttyUSB7'"),
+    ],
+)
+def test_a_mistake_about_a_device_of_a_package_is_told(rest, device, said, read, installed):
+    with pytest.raises(OptionError, match=said):
+        read(glove(rest, device)).sensors()
+
+
+def test_what_a_package_calls_as_ours_is_ours(read, installed):
+    assert isinstance(read(GOOD).sensors()[0], SimulatedPartner)
+
+
+def test_a_robot_in_the_place_of_a_sensor_is_told(read):
+    with pytest.raises(OptionError, match=r"expected a sensor, got <.*>, which has no read$"):
+        read(glove("", "arm"), {"arm": lambda: SimulatedRobot([], [])}).sensors()
+    with pytest.raises(OptionError, match=r"robot\.device: expected a robot, got <.*>, which has no state, command$"):
+        read(re.sub("simulated_robot", "glove", GOOD).replace("home =", "house ="), {"glove": Glove}).robot()
+
+
+# ------------------------------------------------------------------------------------------------------------- types
+
+A, PLACE = "a = ", Path("/place")
+
+
+def plain(a): ...
+def any_(a: Any): ...
+def number(a: float): ...
+def whole(a: int | None = None): ...
+def path(a: Path): ...
+def path_or_text(a: str | Path | None): ...
+def like(a: str | PathLike[str]): ...
+def texts(a: list[str]): ...
+def some(a: Sequence[int]): ...
+def set_(a: frozenset[str]): ...
+def bare(a: tuple): ...
+def pair(a: tuple[float, str]): ...
+def pairs(a: tuple[tuple[float, float], ...]): ...
+def table(a: dict[str, list[float]]): ...
+def loose(a: dict): ...
+def paths(a: Mapping[str, Path]): ...
+def colour(a: Colour): ...
+def mode(a: Literal["fast", "slow", 3]): ...
+def noted(a: Annotated[float, "in metres"]): ...
+def array(a: np.ndarray): ...
+def matrix(a: Float[np.ndarray, "R C"] | None): ...
+def unknown(a: Thing): ...
+def command(a: Command): ...
+def beside(a: float, b: Thing | None = None): ...
+def either(a: float | Mapping[str, float]): ...
+
+
+ACCEPTED = [
+    (plain, "'x'", "x"), (plain, "{ b = [1] }", {"b": [1]}), (any_, "[1]", [1]), (number, "3", 3.0), (whole, "3", 3),
+    (path, "'b/c'", PLACE / "b/c"), (path, "'/b'", Path("/b")), (path_or_text, "'b'", PLACE / "b"), (like, "'b'", PLACE / "b"),
+    (texts, "['x', 'y']", ["x", "y"]), (some, "[1, 2]", (1, 2)), (set_, "['x', 'x']", frozenset("x")), (bare, "[1, 'b']", (1, "b")),
+    (pair, "[1, 'b']", (1.0, "b")), (pairs, "[[1, 2], [3, 4]]", ((1.0, 2.0), (3.0, 4.0))), (table, "{ b = [1] }", {"b": [1.0]}),
+    (loose, "{ b = 'c' }", {"b": "c"}), (paths, "{ b = 'c' }", {"b": PLACE / "c"}), (colour, "'red'", Colour.RED),
+    (mode, "'fast'", "fast"), (mode, "3", 3), (noted, "3", 3.0), (array, "[1, 2]", [1.0, 2.0]), (matrix, "[[1], [2]]", [[1.0], [2.0]]),
+    (unknown, "'x'", "x"), (command, "3", 3), (beside, "3", 3.0), (either, "3", 3.0), (either, "{ b = 3 }", {"b": 3.0}),
+]  # fmt: skip
+REFUSED = [
+    (number, "'3'", "a number"), (number, "true", "a number"), (whole, "3.0", "a whole number"), (path, "3", "a path"),
+    (path_or_text, "3", "a path or a text"), (texts, "'x'", "a list: a text each"), (texts, "[1]", "a text"), (some, "[1.5]", "a whole"),
+    (bare, "3", "a list"), (pair, "[1]", "a list of 2: a number, a text"), (table, "3", "a table of a list: a number each by name"),
+    (loose, "[]", "a table"), (colour, "'green'", "one of red, blue"), (colour, "['red']", "one of red, blue"),
+    (mode, "'medium'", "one of fast, slow, 3"), (mode, "true", "one of fast, slow, 3"), (noted, "'x'", "a number"),
+    (array, "'1'", "a list of numbers"), (array, "[[1], 2]", "a list of numbers"), (array, "['1']", "a list of numbers"),
+    (beside, "'x'", "a number"), (either, "[]", "a number or a table of a number by name"),
+]  # fmt: skip
+
+
+def section(text: str) -> Section:
+    return Section("a.toml", text, PLACE, toml_lines.tomllib.loads(text))
+
+
+@pytest.mark.parametrize(("make", "text", "expected"), ACCEPTED)
+def test_an_entry_comes_as_what_its_parameter_is(make, text, expected):
+    def keep(a: Any, **others: Any) -> Any:
+        return a
+
+    keep.__annotations__ = make.__annotations__
+    got = section(A + text).call(keep)
+    assert type(got) is (np.ndarray if make in (array, matrix) else type(expected))
+    assert (got.tolist() if isinstance(got, np.ndarray) else got) == expected
+
+
+@pytest.mark.parametrize(("make", "text", "expected"), REFUSED)
+def test_an_entry_of_another_type_is_refused_in_words(make, text, expected):
+    with pytest.raises(OptionError, match=rf"^a\.toml, line 1: a: expected {expected}.*, got "):
+        section(A + text).call(make)
+
+
+def test_a_method_a_class_and_a_part_of_a_function_can_be_called():
+    class Called:
+        def __call__(self, a: float) -> float:
+            return a
+
+        def method(self, a: float) -> float:
+            return a
+
+    for make in (
+        Called(),
+        Called().method,
+        functools.partial(lambda b, a: a, 1),
+        functools.partial(Called.method, None),
+    ):
+        assert section("a = 3").call(make) == 3.0
+    assert section("x = 1.5\ny = 3").call(complexes) == complex(1.5, 3)
+
+
+def complexes(*ignored: str, x: float, y: float) -> complex:
+    return complex(x, y)
+
+
+def test_an_error_is_told_at_the_entry_that_it_names_first():
+    def refuse(said: str) -> Callable[..., None]:
+        def make(**entries: Any) -> None:
+            raise OptionError(said)
+
+        return make
+
+    text = "low = 1\nhigh = 2\n[of]\nlow = 3\nfast = [4]\nby = { grip = 1 }\nlist = ['a']"
+    for said, line in (
+        ("expected high > low", 2), ("expected low < high", 1), ("expected lowest < 1", 1), ("expected nothing, got high", 1),
+    ):  # fmt: skip
+        with pytest.raises(OptionError, match=f"^a\\.toml, line {line}: "):
+            section(text).without("of").call(refuse(said))
+    for said, where in (
+        ("of: expected fast", "5: of.fast: expected fast"), ("no channel fits 'grip'", "6: of.by.grip: "), ("no 'a'", "7: of.list: "),
+        ("rain", "3: of: rain"),
+    ):  # fmt: skip
+        with pytest.raises(OptionError, match=f"^a\\.toml, line {where}"):
+            section(text).section("of").call(refuse(said))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from inphase.channels import match
-from inphase.errors import listing
+from inphase.errors import InphaseError, listing
 from inphase.filters import FILTERS, RECOMMENDED
 from inphase.io.toml import read_toml
 from inphase.model import Model
@@ -82,8 +82,13 @@ class Configuration:
         """A new session of the model; raises OptionError where the file names none."""
         model, section = self.needed_model(), self.section("filter")
         name, seed, options = self._filter()
-        with section.naming(["seed", *options]):
-            return model.session(name, seed, **options)
+        with section.naming([*options]):
+            try:
+                return model.session(name, seed, **options)
+            except InphaseError:
+                raise
+            except (TypeError, ValueError, OverflowError, MemoryError) as error:  # as of a text for a number
+                raise section.fail(f"{name} cannot be made with {options}: {error}") from error
 
     def needed_model(self) -> Model:
         """The model; raises OptionError where the file names none."""
