@@ -366,7 +366,7 @@ def test_a_long_value_is_not_said_whole(read):
 
 
 PIECES = st.sampled_from(
-    [*"=[]{}\"'\n.,#\0\r\x85é0", *"-1 nan -inf 1e308 1e400 true [] {} [[1]] '*' 1979-05-27 hold own grip".split(), "9" * 25, "a = 3\n"]
+    [*"=[]{}\"'\n.,#\0\r\x85é0", *["-1", "nan", "-inf", "1e308", "1e400", "true", "[]", "{}", "[[1]]", "'*'", "1979-05-27", "hold", "own", "grip"], "9" * 25, "a = 3\n"]
 )  # fmt: skip
 
 
@@ -387,8 +387,7 @@ def test_whatever_is_written_is_read_or_refused(changes, folder):
         read_configuration(path).loop(FakeClock())
 
 
-VALUES = ["-1", "nan", "inf", "9" * 25, "true", '"x"', "[]", "[1]", '["x"]', "[[1, -2]]", "{ x = 1 }", '{ "*" = nan }']
-VALUES += ['""', '{ "*" = {} }', "07:32:00"]
+VALUES = ["-1", "nan", "9" * 25, "true", '"x"', "[]", "[[1, -2]]", "{ x = 1 }", '{ "*" = {} }']
 ENTRIES = [i for i, line in enumerate(GOOD.splitlines()) if "=" in line]
 
 
