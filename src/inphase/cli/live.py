@@ -21,6 +21,7 @@ from inphase.runtime.configuration import Configuration, no_limits, read_configu
 from inphase.runtime.live import prepared
 from inphase.runtime.loop import Loop
 from inphase.runtime.run_report import RunReport
+from inphase.runtime.safety import Answer
 
 STOPPED_BY_TROUBLE = 1  # exit code
 REFRESHED = 0.2  # [s]
@@ -95,7 +96,11 @@ def _sentence(event: RecordedEvent) -> str:
 
 @contextmanager
 def _stopped_by_signals(loop: Loop) -> Iterator[None]:
-    """Ctrl-C and a request to terminate interrupt the loop; the third time they end the program at once."""
+    """Ctrl-C and a request to terminate interrupt the loop; the third time they end the program at once.
+
+    A request to terminate does not wait for someone to say that the robot may go on: where an interrupt is answered
+    by holding, the robot comes to rest and the program ends.
+    """
     before: dict[signal.Signals, Any] = {}
     came = 0
 
@@ -104,7 +109,10 @@ def _stopped_by_signals(loop: Loop) -> Iterator[None]:
         came += 1
         if came > 2:
             raise KeyboardInterrupt
-        loop.interrupt()
+        if number == signal.SIGTERM and loop.actuation.conduct.policy.interrupt is Answer.HOLD:
+            loop.finish("it was asked to terminate")
+        else:
+            loop.interrupt()
 
     for number in (signal.SIGINT, signal.SIGTERM):
         before[number] = signal.signal(number, interrupt)
