@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import signal
 import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import tyro
 
@@ -21,7 +20,6 @@ from inphase.runtime.configuration import Configuration, no_limits, read_configu
 from inphase.runtime.live import prepared
 from inphase.runtime.loop import Loop
 from inphase.runtime.run_report import RunReport
-from inphase.runtime.safety import Answer
 
 STOPPED_BY_TROUBLE = 1  # exit code
 REFRESHED = 0.2  # [s]
@@ -69,7 +67,7 @@ def lead(console: Output, configuration: Configuration, duration: float | None) 
 
     with prepared(configuration, listeners=[tell]) as run:
         _warn(console, run.loop)
-        with _stopped_by_signals(run.loop), _shown(run.loop):
+        with _shown(run.loop):
             report = run.loop.run(duration)
     for line in report.lines:
         console.print(line)
@@ -93,35 +91,6 @@ def _warn(console: Output, loop: Loop) -> None:
 def _sentence(event: RecordedEvent) -> str:
     changed = f"{event.before} → {event.after}: " if event.after else f"{event.kind}: "
     return changed.lower() + event.reason
-
-
-@contextmanager
-def _stopped_by_signals(loop: Loop) -> Iterator[None]:
-    """Ctrl-C and a request to terminate interrupt the loop; the third time they end the program at once.
-
-    A request to terminate does not wait for someone to say that the robot may go on: where an interrupt is answered
-    by holding, the robot comes to rest and the program ends.
-    """
-    before: dict[signal.Signals, Any] = {}
-    came = 0
-
-    def interrupt(number: int, frame: object) -> None:
-        nonlocal came
-        came += 1
-        if came > 2:
-            raise KeyboardInterrupt
-        if number == signal.SIGTERM and loop.actuation.conduct.policy.interrupt is Answer.HOLD:
-            loop.finish("it was asked to terminate")
-        else:
-            loop.interrupt()
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        before[number] = signal.signal(number, interrupt)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 @contextmanager
