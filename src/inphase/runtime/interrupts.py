@@ -15,7 +15,7 @@ PATIENCE = 2  # times that they are words
 
 @contextmanager
 def interrupts(call: Callable[[int], object]) -> Iterator[None]:
-    """Inside, those signals call `call` with their number; the third raises KeyboardInterrupt, wherever the program is then.
+    """Inside, those signals call `call` with their number; the third is a KeyboardInterrupt wherever the program is.
 
     Handlers of others stay, and so does all outside of the main thread, where Python has no signals.
     """
