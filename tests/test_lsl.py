@@ -182,7 +182,7 @@ def test_markers_are_received_with_all_they_say():
         RecordedEvent(2.5, "end", ""),
     ]
     markers(events[0])  # not begun
-    markers.start(SystemClock())
+    markers.start()
     (info,) = pylsl.resolve_byprop("name", name, timeout=PATIENCE)
     inlet = pylsl.StreamInlet(info)
     inlet.open_stream(PATIENCE)

@@ -162,7 +162,7 @@ class LslMarkers:
         self._info = self._lsl.StreamInfo(stream, kind, 1, 0, "string", f"inphase {stream}")
         self._outlet: Any = None
 
-    def start(self, clock: Clock) -> None:
+    def start(self) -> None:
         """Offer the stream."""
         self._outlet = self._lsl.StreamOutlet(self._info)
 

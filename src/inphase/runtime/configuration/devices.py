@@ -16,6 +16,11 @@ from inphase.channels import Channel, make_channels, spread
 from inphase.errors import OptionError, listing
 from inphase.io import read_episode, read_recording
 from inphase.model import Model
+from inphase.runtime.adapters.bags import bag_sensor
+from inphase.runtime.adapters.lsl import LslMarkers, LslSensor
+from inphase.runtime.adapters.ros1_robot import Ros1Robot
+from inphase.runtime.adapters.ros1_sensor import Ros1Sensor
+from inphase.runtime.adapters.ros1_services import Ros1Services
 from inphase.runtime.configuration.section import Section
 from inphase.runtime.device import Robot, Sensor, Signal
 from inphase.runtime.devices import ReplaySensor, SimulatedPartner, SimulatedRobot
@@ -88,8 +93,17 @@ def by_name(numbers: Mapping[str, float], names: Sequence[str], otherwise: float
     return np.array([given.get(name, otherwise) for name in names], dtype=np.float64)
 
 
-SENSORS: Mapping[str, Maker] = MappingProxyType({"replay": replay, "simulated_partner": simulated_partner})
-ROBOTS: Mapping[str, Maker] = MappingProxyType({"simulated_robot": simulated_robot})
+SENSORS: Mapping[str, Maker] = MappingProxyType(
+    {
+        "replay": replay,
+        "simulated_partner": simulated_partner,
+        "bag": bag_sensor,
+        "lsl": LslSensor,
+        "ros1": Ros1Sensor,
+    }
+)
+ROBOTS: Mapping[str, Maker] = MappingProxyType({"simulated_robot": simulated_robot, "ros1": Ros1Robot})
+OUTPUTS: Mapping[str, Maker] = MappingProxyType({"lsl": LslMarkers, "ros1": Ros1Services})
 
 
 def make_device(section: Section, makers: Mapping[str, Maker], **known: Any) -> Any:
