@@ -235,14 +235,6 @@ def test_where_nothing_can_be_recorded_nothing_is_started(folder, run, monkeypat
     assert "cannot write /proc/live-" in err
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="to root, no folder is read-only")
-def test_a_folder_that_is_read_only_is_told(folder, run):
-    Path("runs").mkdir(mode=0o500)
-    code, out, err = run("live.toml")
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "Permission denied" in err
-
-
 # ------------------------------------------------------------------------------------------------ a process of its own
 
 
