@@ -1,9 +1,9 @@
 """ROS 1 at 100 Hz: joint states of one process in, joint trajectories out to another; what is lost, what is added.
 
-Three processes beside a master of their own: one sends; one follows with a session, looks for samples at 500 Hz and
-answers what came with a command; one receives. The latency that is added is the time from a joint state's sending to
-its command's arrival, less what `observe` and `respond` took of it: two ways over TCP, and the wait for a cycle. A
-message is told by its number, which is the position of one joint more.
+Three processes beside a master of their own: one sends; one is the live loop, which looks for samples and commands at
+500 Hz; one receives. The latency that is added is the time from a joint state's sending to the arrival of the first
+command that knows of it, less what `observe` and `respond` took of it: two ways over TCP, and the wait for a cycle. A
+joint state is told by its number, which is the position of one joint more; commands arrive in their order.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import select
 import socket
 import subprocess
 import sys
@@ -28,10 +29,12 @@ from sizes import DURATION, Size, make_model, partner
 from timing import spread
 
 from inphase.errors import OptionError
-from inphase.runtime import Command, Synchroniser, SystemClock
+from inphase.result import Estimate, Response
+from inphase.runtime import Command, Conduct, Limits, Loop, Play, Rates, Sample, SystemClock
 from inphase.runtime.adapters.ros1_node import find_rospy, message_class
 from inphase.runtime.adapters.ros1_robot import STATE, TRAJECTORY, Ros1Robot
 from inphase.runtime.adapters.ros1_sensor import Ros1Sensor
+from inphase.session import Session
 from inphase.workers import workers
 
 ROWS = {
@@ -43,7 +46,6 @@ ROWS = {
 }
 JOINTS, COMMANDS, NUMBER = "/benchmark/joints", "/benchmark/commands", "number"
 WANTED = 0.005  # [s] for the p99 of what is added
-Taken = dict[int, tuple[float, float, float]]  # by number [s]: received, what the session took, commanded
 WARM_UP = 100  # messages before those that count
 
 
@@ -75,62 +77,108 @@ def send(rate: float, count: int, channels: int, observed: int) -> None:
     sys.stdin.read()
 
 
-def receive(count: int, seconds: float) -> None:
-    """Wait for so many commands, but not for ever; then say which came, and when."""
+def receive(seconds: float) -> None:
+    """Take commands until a line comes, or it takes too long; then say when each arrived."""
     rospy, arrived = node("receive"), []
-
-    def take(message: Any) -> None:
-        now = time.perf_counter()
-        arrived.append((int(message.points[0].positions[-1]), now))
-
-    rospy.Subscriber(COMMANDS, message_class(TRAJECTORY), take, tcp_nodelay=True)
+    rospy.Subscriber(
+        COMMANDS, message_class(TRAJECTORY), lambda _: arrived.append(time.perf_counter()), tcp_nodelay=True
+    )
     print("ready", flush=True)
-    end = time.perf_counter() + seconds
-    while len(arrived) < count and time.perf_counter() < end:
-        time.sleep(0.1)
+    select.select([sys.stdin], [], [], seconds)
     print(json.dumps(arrived), flush=True)
     sys.stdin.read()
 
 
-def follow(count: int, channels: int, poll: float, filter: str, seconds: float) -> tuple[Taken, int]:
-    """Answer what came with a command, in every cycle in which something did; also says how many samples came."""
+class Numbered(Ros1Sensor):
+    """Remembers when the message of every number came."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.came: dict[int, float] = {}
+
+    def read(self) -> list[Sample]:
+        """All that came since the last call."""
+        samples = super().read()
+        self.came.update({int(sample.values[-1]): sample.received for sample in samples})
+        return samples
+
+
+class Counted(Ros1Robot):
+    """Remembers when it was commanded, and by what was known then."""
+
+    def __init__(self, *args: Any, sensor: Numbered, timed: Timed, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.sent: list[tuple[int, float, float]] = []  # newest number, what the session took for it, when
+        self._sensor, self._timed = sensor, timed
+
+    def command(self, command: Command) -> None:
+        """Publish it."""
+        super().command(command)
+        newest = next(reversed(self._sensor.came), -1)
+        self.sent.append((newest, self._timed.spent.pop(newest, 0.0), time.perf_counter()))
+
+
+class Timed:
+    """A session that says how long it took over every sample."""
+
+    def __init__(self, session: Session, sensor: Numbered) -> None:
+        self.spent: dict[int, float] = {}
+        self._session, self._sensor = session, sensor
+        self.reset = session.reset
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._session, name)
+
+    def observe(self, *args: Any) -> Estimate:
+        """As the session."""
+        return self._measured(self._session.observe, *args)
+
+    def respond(self, *args: Any, **options: Any) -> Response:
+        """As the session."""
+        return self._measured(self._session.respond, *args, **options)
+
+    def _measured(self, call: Any, *args: Any, **options: Any) -> Any:
+        begun = time.perf_counter()
+        answer = call(*args, **options)
+        newest = next(reversed(self._sensor.came), -1)
+        self.spent[newest] = self.spent.get(newest, 0.0) + time.perf_counter() - begun
+        return answer
+
+
+def follow(
+    count: int, channels: int, look: float, filter: str, seconds: float
+) -> tuple[dict[int, float], list[tuple[int, float, float]]]:
+    """The live loop between the two topics: when every number came, and when each command left."""
     model, clock = make_model(Size(channels, 15, 108), np.random.default_rng(0)), SystemClock()
-    session = model.session(filter)
     joints = [f"joint_{i}" for i in range(len(model.observed))]
     fields = {name: f"position[{joint}]" for name, joint in zip(model.observed, joints, strict=True)}
-    sensor = Ros1Sensor("partner", JOINTS, STATE, {**fields, NUMBER: f"position[{NUMBER}]"})
-    robot = Ros1Robot("robot", [*model.controlled, NUMBER], COMMANDS, JOINTS)
-    taken: Taken = {}
-    together = Synchroniser({sensor.name: sensor.signals}, staleness=0.5)
-    first, seen = 0.0, 0
-    robot.start(clock)
-    while not robot.listeners:
-        time.sleep(0.01)
-    sensor.start(clock)
-    end, cycle = clock.now() + seconds, clock.now()
-    while seen < count and clock.now() < end:
-        cycle = max(cycle + 1 / poll, clock.now())
-        clock.wait_until(cycle)
-        samples = sensor.read()
-        if not samples:
-            continue
-        seen += len(samples)
-        together.take(sensor.name, samples)
-        *values, number = together.at(clock.now())
-        begun = time.perf_counter()
-        if session.time is not None and samples[-1].received - first > DURATION:
-            session.reset()
-        if session.time is None:
-            first = samples[-1].received
-        session.observe(samples[-1].received, values)
-        response = session.respond(samples=2)
-        spent = time.perf_counter() - begun
-        robot.command(Command(np.array([clock.now() + 0.02]), np.append(response.mean[0], number)[None]))
-        taken[int(number)] = samples[-1].received, spent, time.perf_counter()
+    sensor = Numbered("partner", JOINTS, STATE, {**fields, NUMBER: f"position[{NUMBER}]"})
+    timed = Timed(model.session(filter), sensor)
+    answering = dict(zip(model.controlled, joints, strict=True))
+    robot = Counted("robot", answering, COMMANDS, JOINTS, sensor=sensor, timed=timed)
+    wide = np.full(len(robot.signals), 1e3)
+    loop = Loop(
+        timed,  # type: ignore[arg-type]
+        [sensor],
+        robot,
+        clock,
+        Conduct(Limits(-wide, wide, wide, wide)),
+        rates=Rates(sense=look, respond=look, command=look),
+        play=Play(samples=2),
+    )
+    begun = clock.now()
+    loop.begin()
+    loop.actuation.watchdog.start()
+    following = clock.now() + DURATION
+    while len(sensor.came) < count and clock.now() < begun + seconds:
+        clock.wait_until(loop.due)
+        if clock.now() >= following:
+            loop.reset()
+            following += DURATION
+        loop.cycle()
+    loop.end()
     time.sleep(0.5)  # for what is on its way
-    sensor.stop()
-    robot.stop()
-    return taken, seen
+    return sensor.came, robot.sent
 
 
 @contextmanager
@@ -167,23 +215,27 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
     count = WARM_UP + round(options.seconds * options.rate)
     longest = 30 + 1.5 * count / options.rate
     part = (sys.executable, __file__, "--channels", str(options.channels), "--rate", str(options.rate))
-    with master(), started(*part, "--receive", str(count), "--seconds", str(longest)) as receiver:
+    with master(), started(*part, "--receive", str(longest)) as receiver:
         receiver.stdout.readline()
         with started(*part, "--send", str(count)) as sender:
-            taken, seen = follow(count, options.channels, options.poll, options.filter, longest)
+            came, commands = follow(count, options.channels, options.look, options.filter, longest)
             sent = json.loads(sender.stdout.readline())
+        receiver.stdin.write("\n")
+        receiver.stdin.flush()
         arrived = json.loads(receiver.stdout.readline())
-    come = dict(arrived)
-    known = [k for k in range(WARM_UP, count) if k in come and k in taken]
-    received, spent, commanded = np.array([taken[k] for k in known]).T
-    left, there = np.array([(sent[k], come[k]) for k in known]).T
+    first: dict[int, int] = {}  # by number, the command that answered it first
+    for place, (number, spent, _) in enumerate(commands):
+        if spent and number >= WARM_UP and place < len(arrived):
+            first.setdefault(number, place)
+    received = np.array([came[k] for k in first])
+    spent, commanded = np.array([commands[place][1:] for place in first.values()]).T
+    left, there = np.array([(sent[k], arrived[place]) for k, place in first.items()]).T
     return {
         "sent": count,
-        "lost_on_the_way_in": count - seen,
-        "overtaken": seen - len(taken),
-        "commands": len(taken),
-        "lost_on_the_way_out": len(taken) - len(come),
-        "twice": len(arrived) - len(come),
+        "lost_on_the_way_in": count - len(came),
+        "answered": len(first),
+        "commands": len(commands),
+        "lost_on_the_way_out": len(commands) - len(arrived),
         "session": spread(spent),
         "in": spread(received - left),
         "cycle": spread(commanded - received - spent),
@@ -196,18 +248,18 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--seconds", type=float, default=60.0, metavar="S")
     parser.add_argument("--rate", type=float, default=100.0, metavar="HZ", help="of the joint states")
-    parser.add_argument("--poll", type=float, default=500.0, metavar="HZ", help="how often the follower looks for them")
+    parser.add_argument("--look", type=float, default=500.0, metavar="HZ", help="how often the loop looks for them")
     parser.add_argument("--channels", type=int, default=30)
     parser.add_argument("--filter", default="rbpf")
     parser.add_argument("--json", metavar="FILE", help="where to write the figures")
     parser.add_argument("--send", type=int, help=argparse.SUPPRESS)
-    parser.add_argument("--receive", type=int, help=argparse.SUPPRESS)
+    parser.add_argument("--receive", type=float, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.send is not None:
         send(options.rate, options.send, options.channels, options.channels // 2)
         return 0
     if options.receive is not None:
-        receive(options.receive, options.seconds)
+        receive(options.receive)
         return 0
     try:
         find_rospy()
@@ -217,8 +269,8 @@ def main() -> int:
         figures = measure(options)
     print(
         f"ROS 1, {options.filter}, {options.channels} channels, {options.rate:g} Hz for {options.seconds:g} s: "
-        f"{figures['sent']} joint states, {figures['lost_on_the_way_in']} lost; {figures['overtaken']} "
-        f"came with the next in one cycle; {figures['commands']} commands, {figures['lost_on_the_way_out']} lost"
+        f"{figures['sent']} joint states, {figures['lost_on_the_way_in']} lost; "
+        f"{figures['commands']} commands, {figures['lost_on_the_way_out']} lost"
     )
     for name, what in ROWS.items():
         row = {key: value / 1e3 for key, value in figures[name].items()}
