@@ -7,6 +7,7 @@ import logging
 import math
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -651,6 +652,29 @@ def test_what_is_connected_needs_no_master(another):
         told(live, "read")
         until(lambda: told(live, "read") != "0 True", 10.0)
         assert told(live, "read").endswith("True")
+
+
+def test_a_master_that_freezes_on_the_way_holds_nobody_up(another):
+    options = {"env": another, "stderr": subprocess.DEVNULL}
+    with (
+        own_master(another["ROS_MASTER_URI"]) as freezing,
+        program("live", "/joints", **options) as live,
+        program("publish", "/joints", 100_000, 100.0, **options),
+    ):
+        assert told(live, "start") == "started"
+        until(lambda: told(live, "read").endswith("True"))
+        freezing.send_signal(signal.SIGSTOP)
+        try:
+            told(live, "read")
+            until(lambda: told(live, "read") != "0 True")
+            assert told(live, "command") == "commanded"
+            assert told(live, "stop") == "stopped"
+            assert told(live, "read") == "0 False"
+            assert "no ROS master answers" in told(live, "start")
+            live.stdin.close()
+            assert live.wait(20) == 0
+        finally:
+            freezing.send_signal(signal.SIGCONT)
 
 
 @pytest.mark.parametrize("ending", ["leave", "stop", "shut down"])

@@ -9,9 +9,11 @@ rospy sets up Python's logging as for all nodes (`~/.ros/log`, ROS_LOG_DIR); sig
 
 from __future__ import annotations
 
+import atexit
 import re
 import sys
 import threading
+import time
 import xmlrpc.client
 from collections.abc import Callable
 from concurrent.futures import Future, wait
@@ -142,9 +144,28 @@ def join_ros() -> Any:
         Master().check()
         if not ros.core.is_initialized():
             within("ROS node", lambda: ros.init_node("inphase", anonymous=True, disable_signals=True), 2 * WAIT)
+            _end_in_time(ros)
         if ros.is_shutdown() or not ros.core.is_initialized():
             raise OptionError("the ROS node of this process was shut down, and rospy begins no other: start it again")
     return ros
+
+
+def _end_in_time(ros: Any) -> None:
+    """End the node with the process: what rospy does then waits for a frozen master without a limit."""
+    over = threading.Event()
+
+    def end() -> None:
+        over.wait()
+        ros.signal_shutdown("the program ends")
+
+    # Begun now: a process that ends may begin no thread any more.
+    thread = threading.Thread(target=end, name="inphase ROS: end", daemon=True)
+    thread.start()
+
+    @atexit.register
+    def ending() -> None:
+        over.set()
+        thread.join(WAIT)
 
 
 def subscribe(name: str, topic: str, type: str, take: Callable[[Any], None]) -> Any:
@@ -161,7 +182,9 @@ def subscribe(name: str, topic: str, type: str, take: Callable[[Any], None]) -> 
 
 def leave(*endings: Callable[[], object]) -> None:
     """Unregister what these do; a master that does not answer is not waited for."""
-    for ending in endings:
-        thread = threading.Thread(target=ending, name="inphase ROS: leaving", daemon=True)
+    threads = [threading.Thread(target=ending, name="inphase ROS: leaving", daemon=True) for ending in endings]
+    for thread in threads:
         thread.start()
-        thread.join(WAIT)
+    end = time.monotonic() + WAIT
+    for thread in threads:
+        thread.join(max(end - time.monotonic(), 0.0))
