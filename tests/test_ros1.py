@@ -478,6 +478,19 @@ def test_a_command_on_the_wire_is_due_when_the_loop_says(topic, after, sent):
     assert before <= message.header.stamp <= rospy.Time.now()
 
 
+def test_who_listens_before_the_start_gets_the_first_command_and_the_last(topic):
+    for i in range(3):
+        come: list = []
+        listener = rospy.Subscriber(topic, ros1_node.message_class("trajectory_msgs/JointTrajectory"), come.append)
+        robot = Ros1Robot("robot", ["elbow"], topic)
+        with started(robot) as clock:
+            for k in range(3):
+                robot.command(Command(np.array([clock.now() + 1.0]), np.full((1, 1), 10.0 * i + k)))
+        until(lambda come=come: len(come) == 3)
+        assert [m.points[0].positions[0] for m in come] == [10.0 * i, 10.0 * i + 1, 10.0 * i + 2]
+        listener.unregister()
+
+
 def test_without_a_stamp_a_command_begins_when_it_arrives(topic):
     robot = Ros1Robot("robot", ["elbow"], topic, stamped=False)
     with started(robot) as clock, wire(robot, topic) as come:

@@ -112,6 +112,10 @@ class Master:
         """The type of every topic that somebody publishes now."""
         return {topic: type for topic, type in self._ask("getPublishedTopics", "")}  # noqa: C416 - pairs are lists
 
+    def subscribed(self, topic: str) -> bool:
+        """Whether somebody has subscribed to that topic."""
+        return any(name == topic and nodes for name, nodes in self._ask("getSystemState")[1])
+
     def _ask(self, method: str, *arguments: str) -> Any:
         def ask() -> Any:
             with xmlrpc.client.ServerProxy(self.uri, transport=_Brief()) as proxy:

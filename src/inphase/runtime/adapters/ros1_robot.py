@@ -7,6 +7,7 @@ simulation runs at about real time.
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,7 +16,7 @@ import numpy as np
 from inphase.channels import check_unique, spread
 from inphase.errors import OptionError, listing
 from inphase.runtime.adapters.message_fields import Field, stamp_of
-from inphase.runtime.adapters.ros1_node import join_ros, leave, message_class, subscribe, within
+from inphase.runtime.adapters.ros1_node import WAIT, Master, join_ros, leave, message_class, subscribe, within
 from inphase.runtime.clock import Clock
 from inphase.runtime.device import Command, Sample, Signal
 
@@ -73,7 +74,10 @@ class Ros1Robot:
         self._publisher: Any = None
 
     def start(self, clock: Clock) -> None:
-        """Subscribe and advertise; raises OptionError where no master answers, or a topic is of another type."""
+        """Subscribe and advertise, and wait for who takes commands to connect, where there is one by now.
+
+        Raises OptionError where no master answers, or the state's topic is of another type.
+        """
         self.stop()
         self._clock, self._ros = clock, join_ros()
         command, state = self._topics
@@ -81,6 +85,11 @@ class Ros1Robot:
         self._publisher = within(
             self.name, lambda: self._ros.Publisher(command, self._trajectory, queue_size=WAITING, tcp_nodelay=True)
         )
+
+        if Master().subscribed(self._ros.resolve_name(command)):
+            end = time.monotonic() + WAIT
+            while not self.listeners and time.monotonic() < end:
+                time.sleep(0.01)
 
     def state(self) -> Sample | None:
         """The latest position of every joint, as old as the oldest; None where one was silent for too long."""
