@@ -28,8 +28,8 @@ OFFSETS = {"pose": -123.25, "joints": 5e4}  # [s] of the clocks that stamp, agai
 MAP = TopicMap(
     observed={
         "hand_x": "/hand/pose pose.position.x",
-        "hand_z": "/hand/pose pose.position.z",
         "push": "/forces data[1]",
+        "hand_z": "/hand/pose pose.position.z",
     },
     controlled={"elbow": "/joint_states position[arm.elbow]", "grip": "/gripper grip"},
     rate=90.0,
@@ -39,7 +39,7 @@ MAP = TopicMap(
 
 def truth(times: np.ndarray) -> np.ndarray:
     """(T, 5) what the channels of MAP are; no second derivative is above 4."""
-    return np.stack([np.sin(times), np.cos(2 * times), times - 1, np.sin(2 * times), 0.5 * times], axis=1)
+    return np.stack([np.sin(times), times - 1, np.cos(2 * times), np.sin(2 * times), 0.5 * times], axis=1)
 
 
 def walk(seconds: float = 2.0, *, rates: tuple[int, int] = (1000, 800), padding: int = 0) -> list[Published]:
@@ -48,7 +48,7 @@ def walk(seconds: float = 2.0, *, rates: tuple[int, int] = (1000, 800), padding:
     published, rng = list[Published](), np.random.default_rng(0)
     for t, (_, _, _, elbow, grip) in zip(fast.tolist(), truth(fast).tolist(), strict=True):
         published += [joints(t, t + 1e6 + OFFSETS["joints"], **{"wrist": 0.0, "arm.elbow": elbow}), gripper(t, grip)]
-    for t, (x, z, push, _, _) in zip(slow.tolist(), truth(slow).tolist(), strict=True):
+    for t, (x, push, z, _, _) in zip(slow.tolist(), truth(slow).tolist(), strict=True):
         published += [pose(t, t + 1e6 + OFFSETS["pose"], x, 7.0, z), numbers(t, 0.0, push, *rng.random(padding))]
     return sorted(published, key=lambda message: message[0])
 
@@ -101,9 +101,9 @@ def test_stamps_of_one_clock_are_believed_where_that_is_said(tmp_path):
 def test_a_data_set_has_the_roles_units_and_order_of_the_map(tmp_path):
     paths = [write_bag(tmp_path, format, walk(rates=(100, 60)), name=format) for format in FORMATS]
     dataset, left_out = read_bags(paths, MAP)
-    assert dataset.observed == ("hand_x", "hand_z", "push")
+    assert dataset.observed == ("hand_x", "push", "hand_z")
     assert dataset.controlled == ("elbow", "grip")
-    assert [channel.unit for channel in dataset.channels] == ["m", "m", "", "", ""]
+    assert [channel.unit for channel in dataset.channels] == ["m", "", "m", "", ""]
     assert [demonstration.name for demonstration in dataset] == ["bag", "db3", "mcap"]
     assert left_out == []
     for demonstration in dataset:
@@ -251,7 +251,8 @@ def assert_read_up_to(share: float, *arguments: Any, **options: Any) -> None:
     with file.open("r+b") as opened:
         opened.truncate(int(share * file.stat().st_size))
     demonstration, left_out = read_bag(path, MAP)
-    assert demonstration.duration > 8.0 * share - 2.5  # a chunk may be lost
+    lost = 0.3 if path.suffix == ".bag" and not options["compression"] else 2.5  # of a packed chunk, all
+    assert demonstration.duration > 8.0 * share - lost
     assert [left.what for left in left_out] == [""]
     assert left_out[0].why.startswith(f"{file.name} is damaged, after its message at 17000000")
     np.testing.assert_allclose(demonstration.values, truth(demonstration.times), atol=3e-4)
@@ -380,8 +381,8 @@ def test_a_map_that_is_none_is_refused(tmp_path, content, said):
 def test_a_map_is_read_as_it_is_written(tmp_path):
     path = tmp_path / "map.toml"
     path.write_text(
-        'rate = 90\nstamps = "source"\n[observed]\nhand_x = "/hand/pose pose.position.x"\nhand_z = "/hand/pose   '
-        'pose.position.z"\npush = "/forces data[1]"\n[controlled]\nelbow = "/joint_states position[arm.elbow]"\n'
+        'rate = 90\nstamps = "source"\n[observed]\nhand_x = "/hand/pose pose.position.x"\npush = "/forces data[1]"\n'
+        'hand_z = "/hand/pose   pose.position.z"\n[controlled]\nelbow = "/joint_states position[arm.elbow]"\n'
         'grip = "/gripper grip"\n[units]\n"hand_?" = "m"\n[staleness]\n"*" = 0.5\n'
     )
     read = read_topic_map(path)
