@@ -261,7 +261,20 @@ def assert_read_up_to(share: float, *arguments: Any, **options: Any) -> None:
     assert len(listed.topics) == 4
 
 
-def test_a_bag_that_was_never_closed_is_read(tmp_path):
+def test_a_bag_of_ros_1_that_was_never_closed_is_read_and_told(tmp_path):
+    path = write_bag(tmp_path, "bag", walk(rates=(100, 60)))
+    whole = read_bag(path, MAP)[0]
+    content = path.read_bytes()
+    at = content.index(b"index_pos=") + len(b"index_pos=")
+    active = tmp_path / "walk.bag.active"  # as rosbag calls it until it is closed
+    active.write_bytes(content[:at] + bytes(8) + content[at + 8 :])
+    demonstration, left_out = read_bag(active, MAP)
+    np.testing.assert_array_equal(demonstration.values, whole.values)
+    assert [left.what for left in left_out] == [""]
+    assert left_out[0].why.endswith("it was never closed, and may lack its end")
+
+
+def test_a_bag_of_ros_2_that_was_never_closed_is_read(tmp_path):
     path = write_bag(tmp_path, "db3", [])
     file = data_file(path)
     source = write_bag(tmp_path, "db3", walk(rates=(100, 60)), name="source")

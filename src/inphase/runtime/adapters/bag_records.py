@@ -79,6 +79,7 @@ def _ros1(stream: BoundedStream) -> Iterator[Record]:
 
 def _ros1_records(stream: BoundedStream, known: dict[bytes, Connection]) -> Iterator[Record]:
     """Those of the file, or of one chunk in it."""
+    open_still = False
     while len(length := stream.read(4)) > 0:
         fields = _fields(stream.exactly(_number(length)))
         kind, length = fields[b"op"][0], stream.exactly(4)
@@ -98,8 +99,12 @@ def _ros1_records(stream: BoundedStream, known: dict[bytes, Connection]) -> Iter
         elif kind == MESSAGE:
             seconds, parts = struct.unpack("<II", fields[b"time"])
             yield known[fields[b"conn"]], seconds * 10**9 + parts, data
-        elif kind == HEADER and fields.get(b"encryptor"):
-            raise DataError(f"expected a bag that is not encrypted, got one by {fields[b'encryptor'].decode()}")
+        elif kind == HEADER:
+            open_still = not any(fields[b"index_pos"])  # where the index is, is written last
+            if fields.get(b"encryptor"):
+                raise DataError(f"expected a bag that is not encrypted, got one by {fields[b'encryptor'].decode()}")
+    if open_still:
+        raise EOFError("it was never closed, and may lack its end")
 
 
 def _fields(data: bytes) -> dict[bytes, bytes]:
