@@ -226,7 +226,7 @@ def entries(kind: type) -> set[str]:
 
 def test_the_file_names_every_entry_there_is():
     text = live_toml(chance_model(np.random.default_rng(0), phase_model()), "a", "rbpf", 0)
-    tables = dict(re.findall(r"^\[(\w+)\].*\n((?:[^\[\n].*\n|\n)*)", text, re.MULTILINE))
+    tables = dict(re.findall(r"^(?:# )?\[(\w+)\].*\n((?:(?!# \[)[^\[\n].*\n|\n)*)", text, re.MULTILINE))
     wanted = {
         "rates": entries(Rates),
         "sensing": entries(Sight),
