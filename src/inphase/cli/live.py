@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import signal
 import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import tyro
 
@@ -66,7 +65,7 @@ def lead(console: Output, configuration: Configuration, duration: float | None) 
 
     with prepared(configuration, listeners=[tell]) as run:
         _warn(console, run.loop)
-        with _stopped_by_signals(run.loop), _shown(run.loop):
+        with _shown(run.loop):
             report = run.loop.run(duration)
     for line in report.lines:
         console.print(line)
@@ -91,28 +90,6 @@ def _warn(console: Output, loop: Loop) -> None:
 def _sentence(event: RecordedEvent) -> str:
     changed = f"{event.before} → {event.after}: " if event.after else f"{event.kind}: "
     return changed.lower() + event.reason
-
-
-@contextmanager
-def _stopped_by_signals(loop: Loop) -> Iterator[None]:
-    """Ctrl-C and a request to terminate interrupt the loop; the third time they end the program at once."""
-    before: dict[signal.Signals, Any] = {}
-    came = 0
-
-    def interrupt(number: int, frame: object) -> None:
-        nonlocal came
-        came += 1
-        if came > 2:
-            raise KeyboardInterrupt
-        loop.interrupt()
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        before[number] = signal.signal(number, interrupt)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from inphase.errors import OptionError
 from inphase.result import Estimate
 from inphase.runtime.clock import Clock
 from inphase.runtime.conduct import Conduct
-from inphase.runtime.device import Robot
+from inphase.runtime.device import Robot, Sample
 from inphase.runtime.guard import Guard
 from inphase.runtime.journal import Journal
 from inphase.runtime.lag import lag_of
@@ -43,7 +43,7 @@ class Actuation:
         self.sender = Sender(robot, conduct.limits, conduct.smoothing, self._period, horizon=horizon, silence=patience)
         self.guard = Guard(conduct.policy, conduct.late_commands, clock.now())
         self.watchdog = Watchdog(patience, self.brake, clock.now, again=self._period)
-        self._answered = 0.0
+        self._well = 0.0  # when the robot last answered and took its commands
         self._refused = ""  # why the last command could not be sent
         self._followed: deque[tuple[float, FloatArray, FloatArray]] = deque(maxlen=REMEMBERED)
 
@@ -70,7 +70,7 @@ class Actuation:
         self.robot.start(self._clock)
         try:
             begun = self._clock.now()
-            while (standing := self._standing()) is None:
+            while (sample := self._answer()) is None:
                 if self._clock.now() - begun > FIRST_ANSWER:
                     reason = f": {self._refused}" if self._refused else ""
                     raise OptionError(
@@ -80,9 +80,8 @@ class Actuation:
         except BaseException:
             self.robot.stop()
             raise
-        self._answered = self._clock.now()
-        self.sender.begin(standing, self._answered)
-        self.guard = Guard(self.conduct.policy, self.conduct.late_commands, self._answered)
+        self._well = self._clock.now()
+        self.sender.begin(sample.values, self._well)
 
     def command(
         self, now: float, course: Course | None, estimate: Estimate | None, unseen: tuple[str, ...], missed: int
@@ -91,7 +90,7 @@ class Actuation:
 
         course: None brings the robot to rest, whatever else would be done. unseen, missed: as for `Guard.react`.
         """
-        self._look(now)
+        standing = self._look(now)
         braked = f"the loop stood still for {self.watchdog.patience:g} s" if self.watchdog.barked else ""
         event = self.guard.react(
             now, estimate, unseen, missed, braked, at_rest=self.sender.at_rest(now), arrived=self._arrived(now)
@@ -100,7 +99,10 @@ class Actuation:
             self._journal.tell(now, "safety", event.reason, event.before.name, event.after.name)
         if self.state is State.RETREATING and course is not None:
             course = self._retreat
-        self._send(now, course if self.state in (State.RUNNING, State.RETREATING) else None)
+        moves = self.state in (State.RUNNING, State.RETREATING) and self.guard.lost_robot is None
+        self._send(now, course if moves else None)
+        if standing is not None:
+            self._followed.append((now, self.sender.positions(now), standing))
         self.watchdog.feed()
 
     def brake(self) -> None:
@@ -116,7 +118,11 @@ class Actuation:
         while not self.at_rest and self._clock.now() < latest:
             self.brake()
             self._clock.wait_until(self._clock.now() + self._period)
-        self.robot.stop()
+        try:
+            self.robot.stop()
+        except Exception as error:  # noqa: BLE001 - the sensors have to be stopped too
+            told = f"{self.robot.name} could not be stopped: {type(error).__name__}: {error}"
+            self._journal.tell(self._clock.now(), "robot", told)
 
     def _send(self, now: float, course: Course | None) -> None:
         try:
@@ -128,20 +134,27 @@ class Actuation:
         self.commands += 1
         self._journal.command(now, command, self._signals)
 
-    def _look(self, now: float) -> None:
-        """Find out whether the robot is there, and where."""
-        standing, lost = self._standing(), self.guard.lost_robot is not None
-        if standing is not None:
-            self._answered = now
-            self._followed.append((now, self.sender.positions(now), standing))
-        self.guard.lost_robot = self._refused or None
-        if now - self._answered > self.conduct.silence and not self._refused:
-            self.guard.lost_robot = f"{self.robot.name} has said nothing for {self.conduct.silence:g} s"
-        if lost and self.guard.lost_robot is None and standing is not None:
-            self.sender.begin(standing, now)  # it may have been moved: it goes on from where it stands
-            self._journal.tell(now, "robot", f"{self.robot.name} answers again")
+    def _look(self, now: float) -> FloatArray | None:
+        """Where the robot stands; None where it does not say. It is lost while it refuses, or is silent for too long.
 
-    def _standing(self) -> FloatArray | None:
+        One that was lost for so long may have been moved: what it is sent begins where it stands. One that only missed
+        a command is still on its way, and goes on from where it was sent.
+        """
+        sample, was_lost = self._answer(), self.guard.lost_robot is not None
+        self.guard.lost_robot = self._refused or None
+        if sample is None:
+            if not self._refused and now - self._well > self.conduct.silence:
+                self.guard.lost_robot = f"{self.robot.name} has said nothing for {self.conduct.silence:g} s"
+            return None
+        if was_lost and now - self._well > self.conduct.silence:
+            self.sender.begin(sample.values, now)
+        if not self._refused:
+            self._well = min(sample.received, now)
+            if was_lost:
+                self._journal.tell(now, "robot", f"{self.robot.name} answers again")
+        return sample.values
+
+    def _answer(self) -> Sample | None:
         """Where the robot says it stands; None where it says nothing, or nothing new."""
         try:
             sample = self.robot.state()
@@ -150,11 +163,13 @@ class Actuation:
             return None
         if sample is None or not np.isfinite(sample.values).all():
             return None
-        return sample.values if self._clock.now() - sample.received <= self.conduct.silence else None
+        return sample if self._clock.now() - sample.received <= self.conduct.silence else None
 
     def _arrived(self, now: float) -> bool:
         pose = self.conduct.retreat
-        return pose is not None and bool(np.abs(self.sender.positions(now) - pose).max(initial=0.0) <= THERE)
+        if pose is None or self.guard.lost_robot is not None:
+            return False
+        return bool(np.abs(self.sender.positions(now) - pose).max(initial=0.0) <= THERE)
 
     def _retreat(self, times: Float[np.ndarray, " S"], near: Float[np.ndarray, " D"]) -> Float[np.ndarray, "S D"]:
         pose = near if self.conduct.retreat is None else self.conduct.retreat

@@ -57,12 +57,15 @@ class Journal:
         self.events.append(event)
         if self.recorder is not None:
             self.recorder.put_event(event)
+        failed = []
         for listener in tuple(self.listeners):
             try:
                 listener(event)
             except Exception as error:  # noqa: BLE001 - who listens must not be able to stop a robot's loop
                 self.listeners.remove(listener)
-                self.tell(time, "listener", f"one failed and hears nothing more: {type(error).__name__}: {error}")
+                failed.append(f"one failed and hears nothing more: {type(error).__name__}: {error}")
+        for told in failed:  # when all have heard of the event itself
+            self.tell(time, "listener", told)
 
     def tell_once(self, time: float, kind: str, reason: str) -> None:
         """An event that lasts, and is told when it begins."""

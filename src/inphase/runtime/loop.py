@@ -10,12 +10,16 @@ from functools import partial
 from math import inf
 from typing import TypeVar
 
+import numpy as np
+from jaxtyping import Float
+
 from inphase.errors import OptionError
 from inphase.result import Estimate
 from inphase.runtime.actuation import Actuation
 from inphase.runtime.clock import Clock
 from inphase.runtime.conduct import Conduct
 from inphase.runtime.device import Robot, Sensor, check_signals
+from inphase.runtime.interrupts import interrupts
 from inphase.runtime.journal import Journal
 from inphase.runtime.perception import Perception, Sight
 from inphase.runtime.playing import Play, Player
@@ -138,11 +142,13 @@ class Loop:
         """Begin, go on until the interaction is over, the robot has stopped or `duration` [s] have passed, and end.
 
         watch: with the watchdog, a thread that looks at real time. Whatever happens, the robot is brought to rest
-        first; what made the program fail is raised after that.
+        first; what made the program fail is raised after that. Ctrl-C and SIGTERM are an `interrupt`, unless the
+        program has handlers of its own for them.
         """
         from threadpoolctl import threadpool_limits
 
-        with threadpool_limits(limits=1):  # the products are small: two threads wait for each other
+        # One thread: the products are small, and two wait for each other.
+        with threadpool_limits(limits=1), interrupts(self.interrupt):
             self.begin()
             try:
                 if watch:
@@ -218,6 +224,7 @@ class Loop:
         self.perception.stop()
         gc.unfreeze()
         self._ended = self.clock.now()
+        self._tell_failed(self._ended)
         self.journal.tell(self._ended, "end", self._reason)
         self.journal.tell(self._ended, "report", self.report.as_json)
 
@@ -248,12 +255,17 @@ class Loop:
 
     def _sense(self, now: float) -> None:
         self._timed("sense", self.perception.sense)
+        self._tell_failed(now)
+
+    def _tell_failed(self, now: float) -> None:
         for sensor, reason in self.perception.failed.items():
             self.journal.tell_once(now, "sensor", f"{sensor} failed and is not read any more: {reason}")
 
     def _observe(self, now: float) -> None:
-        for values, estimate in self._timed("observe", partial(self.perception.observe, now)):
+        begun = self.clock.now()
+        for values, estimate in self.perception.observe(now):  # each is recorded before the next one can fail
             self.journal.step(values, estimate)
+        self.timings["observe"].add(self.clock.now() - begun)
 
     def _respond(self, now: float) -> None:
         estimate = self.perception.last
@@ -271,11 +283,18 @@ class Loop:
 
     def _command(self, now: float, missed: int) -> None:
         self.missed += missed
-        course = None if self._ending else self.player.wanted
+        course = None if self._ending else self._wanted
         command = partial(self.actuation.command, now, course, self.estimate, self.perception.unseen(now), missed)
         self._timed("command", command)
         if self.journal.failure is not None:
             self.journal.tell_once(now, "recorder", self.journal.failure)
+
+    def _wanted(self, times: Float[np.ndarray, " S"], near: Float[np.ndarray, " D"]) -> Float[np.ndarray, "S D"]:
+        try:
+            return self.player.wanted(times, near)
+        except Exception as error:  # noqa: BLE001 - it is not the robot that fails
+            self.actuation.guard.failure = error
+            return np.full((len(times), len(near)), np.nan)
 
     def _reset(self) -> None:
         now = self.clock.now()

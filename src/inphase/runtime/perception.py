@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
@@ -115,8 +115,8 @@ class Perception:
                 except Exception as error:  # noqa: BLE001 - whatever a device does, the robot has to be brought to rest
                     self.failed[sensor.name] = f"{type(error).__name__}: {error}"
 
-    def observe(self, now: float) -> list[tuple[FloatArray, Estimate]]:
-        """Every new reading and what the session made of it; one that is blind where all has been stale."""
+    def observe(self, now: float) -> Iterator[tuple[FloatArray, Estimate]]:
+        """Every new reading and what the session makes of it, one after the other; a blind one where all is stale."""
         until = now - self._delay
         readings = self.synchroniser.fetch(until, self._within)
         seen = [(time, values[self._order]) for time, values in readings if time > self._since]
@@ -128,15 +128,13 @@ class Perception:
             seen = seen[-CATCH_UP:]
         if not seen and self.session.time is not None and self._stale(now).all():
             seen = [(until, self._blind)]
-        steps = []
         for time, values in seen:
             last = self.session.time
             if last is not None and time < last:  # it waited for others that were read before it, or came late
                 self.late += last - time > self._within and not np.isnan(values).all()
                 time = last
             self.last = self.session.observe(time, values)
-            steps.append((values, self.last))
-        return steps
+            yield values, self.last
 
     def unseen(self, now: float) -> tuple[str, ...]:
         """The channels that are stale, where what is left is not enough to know the partner by; else none."""

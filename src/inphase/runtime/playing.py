@@ -77,6 +77,10 @@ class Player:
         if estimate.phase < self.play.start and not self._periodic:
             self.response = None
             return None
+        stop = 1.0 if self._periodic else self.play.stop
+        if stop < 1 and estimate.phase + self.play.lookahead >= stop:
+            self.response, self._ahead = session.respond(samples=self.play.samples, start=stop), 0.0
+            return self.response
         response = session.respond(self.play.lookahead, self.play.samples)
         # What lies ahead in phase is wanted now; what a lag eats up is wanted by so much sooner.
         ahead = float(response.times[0]) - (session.time or 0.0)
@@ -98,7 +102,7 @@ class Player:
     @property
     def ends(self) -> float:
         """When the response that is played has come to its end [s]."""
-        return -inf if self.response is None else float(self.response.times[-1]) - self._ahead
+        return -inf if self.response is None else float(self._until_stop(self.response).times[-1]) - self._ahead
 
     def _until_stop(self, response: Response) -> Response:
         if self.play.stop == 1 or self._periodic:

@@ -10,7 +10,7 @@ SAME = 1e-9  # of a period: two times that close are one
 
 
 class Schedule:
-    """Times `period` apart from `begin` on [s]; a time that has passed is still due, but only the last of several.
+    """Times `period` apart from `begin` on [s]; a time that has passed is still due, but several are one.
 
     Times are counted from the beginning, so that a cycle that comes late does not move those after it. Raises
     OptionError for a rate that is not positive.
@@ -32,8 +32,7 @@ class Schedule:
         return now >= self.due - SAME * self.period
 
     def done(self, now: float) -> int:
-        """Go on to the next; how many were left out because their time, and that of one after them, has passed."""
-        passed = floor((now - self._begin) / self.period + SAME)
-        following = max(self._count + 1, passed)
-        left_out, self._count = following - self._count - 1, following
+        """Done, once for all whose time has passed: go on to the next; how many were left out."""
+        passed = max(floor((now - self._begin) / self.period + SAME), self._count)
+        left_out, self._count = passed - self._count, passed + 1
         return left_out

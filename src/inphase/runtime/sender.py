@@ -61,9 +61,12 @@ class Sender:
             self._motions = [Motion.at_rest(positions)]
 
     def positions(self, now: float) -> Float[np.ndarray, " D"]:
-        """(D,) where the robot is sent at that time [s]."""
+        """(D,) where the robot is sent at that time [s]; between two points of a trajectory on their line."""
         with self._lock:
-            return np.asarray(self._positions[self._reached(now)])
+            place = self._reached(now)
+            here, following = self._positions[place], self._positions[place : place + 2][-1]
+            share = min(max((now - self._times[place]) / self._period, 0.0), 1.0)
+            return np.asarray(here + share * (following - here))
 
     def at_rest(self, now: float) -> bool:
         """Whether it is not sent anywhere else from that time on [s]."""
@@ -85,6 +88,7 @@ class Sender:
         return max(int(np.searchsorted(self._times, now, side="right")) - 1, 0)
 
     def _point(self, course: Course | None, now: float) -> Command:
+        now = max(now, self._times[-1])  # who waited for the other thread looked at the clock before it
         dt = now - self._times[-1]
         if dt > self._silence:  # it has come to rest there, and goes on as from any rest
             self.begin(self._positions[-1], now)
