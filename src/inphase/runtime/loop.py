@@ -278,7 +278,7 @@ class Loop:
             self._closing = inf
         elif self._closing == inf:  # what is left of it is played to its end
             self._closing = max(self.player.ends, now) + SETTLES / self.rates.command
-        elif now >= self._closing:
+        elif now >= self._closing and self.state not in (State.RETREATING, State.STOPPING):  # which have their own end
             self.finish("the interaction is over")
 
     def _command(self, now: float, missed: int) -> None:

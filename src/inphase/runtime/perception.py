@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool
 
 from inphase.arrays import FloatArray
 from inphase.channels import match
@@ -143,7 +143,7 @@ class Perception:
         lacking = any(needed <= gone for needed in self._needed) if self._needed else len(gone) == len(self.names)
         return tuple(self.names[i] for i in sorted(gone)) if lacking else ()
 
-    def _stale(self, now: float) -> Float[np.ndarray, " D"]:
+    def _stale(self, now: float) -> Bool[np.ndarray, " D"]:
         return np.asarray(self.synchroniser.ages(now)[self._order] > self._staleness + self._delay)
 
 
