@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,6 +22,7 @@ from inphase.runtime.smoothing import AlphaBeta
 
 SEEDS = range(20)
 LONGEST = 3.0  # [s] of a run that does not end by itself
+ENDLESS = 12.0  # [s]: a retreat may take ten
 
 
 def quick_model() -> inphase.Model:
@@ -111,9 +111,9 @@ def check(run: Bench) -> None:
 
 def check_reached(run: Bench, fact: float, answer: Answer, period: float, until: float = np.inf) -> None:
     """From one cycle of commands after a fact [s] on, what is sent is at least as careful as the policy says."""
-    before = [state for now, _, state in run.robot.sent if now <= fact]
+    before = [state for now, _, state in run.robot.sent if now < fact - 1e-9]
     assert before[-1] is State.RUNNING, "the fault came when nothing was at stake"
-    states = [state for now, _, state in run.robot.sent if fact + period + 1e-9 < now < until]
+    states = [state for now, _, state in run.robot.sent if fact + period - 1e-9 <= now < until - 1e-9]
     assert states
     assert min(state.rank for state in states) >= answer.state.rank
     assert any(event.time <= fact + period + 1e-9 for event in run.safety if event.before == "RUNNING")

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from injected import LONGEST, SEEDS, Conditions, check, check_reached, last_seen, quick_model, quickly
+from injected import ENDLESS, LONGEST, SEEDS, Conditions, check, check_reached, last_seen, quick_model, quickly
 from rigs import HOME, Listed
 
 import inphase
@@ -34,7 +34,7 @@ def test_a_dead_sensor(model, tmp_path, seed):
     now = Conditions(model, seed)
     length = now.length if seed % 4 else np.inf
     run = now.bench(tmp_path / "run.mcap", Dead(now.partner, now.onset, length), policy={"stale_sensors": now.answer})
-    run.run(LONGEST)
+    run.run(ENDLESS if now.answer is Answer.RETREAT else LONGEST)
     check(run)
     check_reached(
         run, last_seen(now.sensor, now.onset) + now.staleness, now.answer, now.period, until=now.onset + length

@@ -1,0 +1,113 @@
+"""A process that leads a robot is killed at any time: what it recorded is readable, and replays to the last bit."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from interactions import dataset, shapes_unchecked, taught
+
+import inphase
+from inphase.io import read_recorded_model, read_recording
+from inphase.runtime.replay import identical, replay
+
+KILLS = 20
+AT_ONCE = 4
+INTERACTION = """
+model = "model.inphase"
+[filter]
+name = "bip"
+[rates]
+sense = 60
+respond = 15
+command = 40
+[sensors.partner]
+device = "simulated_partner"
+tempo = 0.3
+clock = "shared"
+[robot]
+device = "simulated_robot"
+home = {grip = 0.8, turn = 0.0}
+[robot.limits."*"]
+velocity = 2.0
+acceleration = 20.0
+[response]
+samples = 10
+[recording]
+folder = "runs"
+"""
+FORKED = """
+import os, sys
+from inphase.cli import main
+for folder in sys.argv[1:]:  # one process for each, all from this one that has read the library
+    if os.fork() == 0:
+        os.chdir(folder)
+        print(os.getpid(), flush=True)
+        devnull = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(devnull, 1), os.dup2(devnull, 2)
+        os._exit(main(["live", "run.toml"]))
+while True:
+    try:
+        os.wait()
+    except ChildProcessError:
+        break
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system cannot fork a process")
+def test_killed_at_any_time(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    model = taught(dataset(np.random.default_rng(0)))
+    folders = [tmp_path / f"{i}" for i in range(KILLS)]
+    for folder in folders:
+        folder.mkdir()
+        (folder / "run.toml").write_text(INTERACTION)
+        model.save(folder / "model.inphase")
+    for first in range(0, KILLS, AT_ONCE):
+        _kill(folders[first : first + AT_ONCE], rng)
+    with shapes_unchecked():
+        counts = [_check(folder, model) for folder in folders]
+    assert len(counts) == KILLS
+    assert sum(count > 0 for count in counts) > KILLS / 2  # they did come to something
+
+
+def _kill(folders: list[Path], rng: np.random.Generator) -> None:
+    """Start a run in each folder, and kill each at some time after its recording has begun."""
+    with subprocess.Popen(
+        [sys.executable, "-c", FORKED, *map(str, folders)],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+    ) as parent:
+        assert parent.stdout is not None
+        lives = {int(parent.stdout.readline()): None for _ in folders}
+        # The lines come in the order of the forks or not: who writes into which folder does not matter.
+        latest = time.monotonic() + 60
+        while time.monotonic() < latest and not all(_begun(folder) for folder in folders):
+            time.sleep(0.01)
+        for pid in lives:
+            time.sleep(rng.uniform(0.0, 0.5))
+            os.kill(pid, 9)
+        parent.wait(60)
+
+
+def _begun(folder: Path) -> bool:
+    return any(path.stat().st_size for path in folder.glob("runs/*.mcap"))
+
+
+def _check(folder: Path, model: inphase.Model) -> int:
+    """How many estimates the recording in it holds, all of which are made again."""
+    (file,) = folder.glob("runs/*.mcap")
+    recording, held = read_recording(file), read_recorded_model(file)
+    assert held is not None
+    made = list(replay(recording, held))
+    assert len(recording.estimates) <= len(made) <= len(recording.estimates) + 1  # an estimate follows its sample
+    assert all(identical(one, other) for one, other in zip(made, recording.estimates, strict=False))
+    assert recording.events == () or recording.events[0].kind == "start"
+    assert not any(event.kind == "end" for event in recording.events)  # it was killed on the way
+    return len(recording.estimates)
