@@ -7,6 +7,10 @@ PYTHON ?= $(or $(firstword $(MADE)),python3)
 PIP := PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 \
        $(BIN)/python -m pip install --quiet
 
+# ROS 1 as Debian packages it. What is appended to an environment's path never hides what the environment has itself.
+DEBIAN := /usr/lib/python3/dist-packages
+ROS1 := $(if $(wildcard $(DEBIAN)/rospy/__init__.py),$(VENV)/ros1)
+
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
 .PHONY: help demo test lint bench growth accuracy clean
@@ -17,7 +21,7 @@ help:  ## what there is to make
 demo: $(VENV)/demo  ## learn from real handwriting, and follow a recording that was left out
 	$(BIN)/inphase demo $(ARGS)
 
-test: lint  ## everything that must hold: lint, then the tests (make test ARGS="-k session")
+test: lint $(ROS1)  ## everything that must hold: lint, then the tests (make test ARGS="-k session")
 	@# As many files at a time as there are processors; of one file, tests share what they have set up.
 	$(BIN)/pytest -n logical --dist loadfile $(ARGS)
 
@@ -28,9 +32,10 @@ lint: $(VENV)/dev  ## style, types and arrows
 	$(if $(shell $(BIN)/python -c 'import sys; print("y" * (sys.version_info >= (3, 11)))' 2>/dev/null),$(BIN)/mypy,@echo "mypy: needs Python 3.11 or newer")
 	$(BIN)/lint-imports
 
-bench: $(VENV)/demo  ## how long a step takes, beside plain loops and the floor; then a partner at 500 Hz
+bench: $(VENV)/demo $(ROS1)  ## how long a step takes, beside plain loops and the floor; then a partner at 500 Hz
 	$(BIN)/python benchmarks/speed.py $(ARGS)
 	$(if $(ARGS),,$(BIN)/python benchmarks/live.py)
+	$(if $(ARGS),,$(if $(ROS1),$(BIN)/python benchmarks/ros1.py,@echo "benchmarks/ros1.py: needs ROS 1 (docs/ros.md)"))
 
 growth: $(VENV)/demo  ## how the cost of a step grows: the picture in docs/performance.md
 	$(BIN)/python benchmarks/growth.py --output docs/pictures/growth.png $(ARGS)
@@ -66,3 +71,7 @@ $(VENV)/dev: $(VENV)/made pyproject.toml constraints.txt
 	@echo "installing inphase and its tools into $(VENV): once, a minute or two"
 	@$(PIP) -e '.[dev]'
 	@touch $(VENV)/demo $@
+
+$(VENV)/ros1: $(VENV)/made
+	@echo $(DEBIAN) > "$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/debian.pth"
+	@touch $@

@@ -65,7 +65,7 @@ PUBLIC = [
     "sparse_basis",
     "trim",
 ]
-PUBLIC_PACKAGES = ["inphase.basis", "inphase.filters", "inphase.io"]
+PUBLIC_PACKAGES = ["inphase.basis", "inphase.filters", "inphase.io", "inphase.runtime", "inphase.runtime.devices"]
 
 
 # ------------------------------------------------------------------------------------------------ reading the source

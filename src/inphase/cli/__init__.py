@@ -34,11 +34,13 @@ def _run(arguments: Sequence[str]) -> int:
     import tyro
     from threadpoolctl import threadpool_limits
 
+    from inphase.cli.bags import bags
     from inphase.cli.demo import demo
     from inphase.cli.evaluate import evaluate
     from inphase.cli.fit import fit
     from inphase.cli.inspect import inspect
     from inphase.cli.live import live
+    from inphase.cli.record import record
     from inphase.cli.replay import replay
     from inphase.cli.replay_run import is_of_run, replay_run
     from inphase.cli.select import select
@@ -52,6 +54,8 @@ def _run(arguments: Sequence[str]) -> int:
         "replay": replay_run if arguments[:1] == ["replay"] and is_of_run(arguments[1:]) else replay,
         "evaluate": evaluate,
         "select": select,
+        "bags": bags,
+        "record": record,
         "live": live,
     }
     # The products of a filter are small: two threads make each slower, many times so on a busy machine.

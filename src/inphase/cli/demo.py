@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import shlex
-import shutil
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
 from inphase.cli.console import Output, working
+from inphase.cli.demo_live import demo_live
 from inphase.cli.evidence import summary
 from inphase.cli.follow import follow
 from inphase.cli.jobs import processes
 from inphase.cli.picture import panel
+from inphase.cli.program import program
 from inphase.cli.reading import FilterName
 from inphase.cli.scores import LEGEND, ScoreTable, figures
 from inphase.errors import OptionError, listing
@@ -25,6 +25,7 @@ from inphase.report.replay_picture import check_picture, draw_replays
 from inphase.training import fit
 
 SHAPES = ("Angle", "GShape", "Sine", "Sshape")
+LIVE = ("Sine",)
 
 
 def demo(
@@ -33,8 +34,10 @@ def demo(
     filter: FilterName = RECOMMENDED,
     seed: int = 0,
     calibrate: Annotated[bool, tyro.conf.arg(help_behavior_hint="")] = False,
+    live: Annotated[bool, tyro.conf.arg(help_behavior_hint="")] = False,
+    duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS", help_behavior_hint="")] = None,
 ) -> int:
-    """Learn from real human handwriting, and follow a hand that was never seen.
+    """Learn from real human handwriting, and follow a hand that was never seen; or, live, one that is simulated.
 
     Args:
         output: the folder for recordings, models and the picture
@@ -42,7 +45,13 @@ def demo(
         filter: how phase and weights are inferred
         seed: of the filter's random numbers
         calibrate: choose noise, tempo and more by held-out demonstrations, as `inphase fit` does: some minutes
+        live: lead a simulated robot in real time, as OUTPUT/live.toml says, which is written to be copied
+        duration: of the live run, at most
     """
+    if live:
+        return demo_live(output, LIVE if shapes == SHAPES else shapes, filter, seed, calibrate, duration)
+    if duration is not None:
+        raise OptionError("a duration is that of a live run: expected --live too")
     picture = output / "demo.png"
     _check(output, picture, shapes, filter)
     console = Output()
@@ -78,7 +87,7 @@ def demo(
         ["replay", model_file, recordings / f"{last.name}.csv", "--filter", "bip"],
         ["fit", recordings, "--observed", "x", "--controlled", "y", "--report", "-o", "my.inphase"],
     ):
-        console.print(f"  {_program()} {shlex.join(map(str, words))}")
+        console.print(f"  {program()} {shlex.join(map(str, words))}")
     return 0
 
 
@@ -92,11 +101,3 @@ def _check(output: Path, picture: Path, shapes: tuple[str, ...], filter: str) ->
     if filter not in FILTERS:
         raise OptionError(f"unknown filter {filter!r}; one of {listing(FILTERS)}")
     check_picture(picture)
-
-
-def _program() -> str:
-    """How this program was called, so that a line can be pasted: it need not be on the path, as under `make demo`."""
-    called = sys.argv[0]
-    if Path(called) == Path(__file__).with_name("__main__.py"):
-        return f"{shlex.quote(sys.executable)} -m inphase.cli"
-    return shlex.quote(called) if Path(called).stem == "inphase" and shutil.which("inphase") != called else "inphase"

@@ -47,15 +47,17 @@ def live(
     if check:
         _check(console, configuration)
         return 0
-    code, report = lead(console, configuration, duration)
+    code, report, recording = lead(console, configuration, duration)
+    if recording is not None:
+        console.print(f"next, try: inphase replay {recording}", style="bold")
     if json_:
         json.dump(json.loads(report.as_json), sys.stdout, indent=1)
         print()
     return code
 
 
-def lead(console: Output, configuration: Configuration, duration: float | None) -> tuple[int, RunReport]:
-    """Run it, with what happens printed on the way."""
+def lead(console: Output, configuration: Configuration, duration: float | None) -> tuple[int, RunReport, Path | None]:
+    """Run it, with what happens printed on the way: exit code, figures, and the recording if there is one."""
     begun: list[float] = []
 
     def tell(event: RecordedEvent) -> None:
@@ -71,8 +73,7 @@ def lead(console: Output, configuration: Configuration, duration: float | None) 
         console.print(line)
     if run.recording is not None:
         console.print(f"wrote {run.recording}")
-        console.print(f"next, try: inphase replay {run.recording}", style="bold")
-    return (STOPPED_BY_TROUBLE if report.stopped else 0), report
+    return (STOPPED_BY_TROUBLE if report.stopped else 0), report, run.recording
 
 
 def _check(console: Output, configuration: Configuration) -> None:

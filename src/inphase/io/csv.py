@@ -47,12 +47,14 @@ def write_csv(
     values: Float[np.ndarray, "T D"],
     *,
     time: str = "time",
+    new: bool = False,
 ) -> None:
     """Write an episode so that `read_csv` reads the very same numbers; times in [s], NaN as an empty cell.
 
-    Raises OptionError where the file cannot be written; it is written whole or not at all.
+    Raises OptionError where the file cannot be written; it is written whole or not at all. With `new` no file is
+    written over: FileExistsError.
     """
-    with whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+    with whole_file(path, new=new) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([time, *columns])
         for row in np.column_stack([times, values]).tolist():

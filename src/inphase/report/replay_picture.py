@@ -122,7 +122,7 @@ def _draw_response(axes: Axes, panel: ReplayPanel, channel: int) -> None:
         axes.plot(at[0], response.mean[0, channel], "o", color=colour, ms=5)
     axes.set_ylabel(f"{name} [{unit}]" if unit else name)
     axes.set_xlim(0, 1.15 * times[-1])
-    _plain(axes)
+    plain(axes)
 
 
 def _draw_phase(axes: Axes, panel: ReplayPanel) -> None:
@@ -131,7 +131,7 @@ def _draw_phase(axes: Axes, panel: ReplayPanel) -> None:
     _band(axes, panel.times, phases, stds, None)
     axes.set_ylim(-0.05, 1.05)
     axes.set_xlabel("time [s]")
-    _plain(axes)
+    plain(axes)
 
 
 def _band(axes: Axes, times: Any, mean: Any, std: Any, label: str | None) -> None:
@@ -139,7 +139,8 @@ def _band(axes: Axes, times: Any, mean: Any, std: Any, label: str | None) -> Non
     axes.plot(times, mean, color=NOW, lw=1.6, label=label)
 
 
-def _plain(axes: Axes) -> None:
+def plain(axes: Axes) -> None:
+    """Nothing but what tells something."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(color="#e6e9ed", lw=0.7)
     axes.set_axisbelow(True)

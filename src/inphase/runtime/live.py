@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from inphase.errors import OptionError
 from inphase.runtime.clock import Clock, SystemClock
-from inphase.runtime.configuration.devices import Maker, make_device
+from inphase.runtime.configuration.devices import OUTPUTS, Maker, make_device
 from inphase.runtime.configuration.interaction import Configuration
 from inphase.runtime.journal import Journal, Listener
 from inphase.runtime.loop import Loop
@@ -97,6 +97,3 @@ def _target(configuration: Configuration) -> tuple[Path | None, int]:
     stem = f"{configuration.path.stem}-{time.strftime('%Y%m%d-%H%M%S')}"
     taken = (folder / f"{stem}{'' if i == 1 else f'-{i}'}.mcap" for i in range(1, 1000))
     return next(path for path in taken if not path.exists()), section.get("capacity", int, 4096)
-
-
-OUTPUTS: Mapping[str, Callable[..., Any]] = {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import signal
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -24,7 +25,7 @@ from inphase.runtime.journal import Journal
 from inphase.runtime.perception import Perception, Sight
 from inphase.runtime.playing import Play, Player
 from inphase.runtime.run_report import RunReport
-from inphase.runtime.safety import State
+from inphase.runtime.safety import Answer, State
 from inphase.runtime.schedule import Schedule
 from inphase.runtime.timing import Timing
 from inphase.session import Session
@@ -99,6 +100,7 @@ class Loop:
         self._begun = self._ended = 0.0
         self._closing = inf  # when the interaction has been over for long enough
         self._ending = ""  # why it ends
+        self._responded: Estimate | None = None
         self._asked: deque[Callable[[], None]] = deque()  # by other threads, for the next cycle
 
     def __repr__(self) -> str:
@@ -148,7 +150,7 @@ class Loop:
         from threadpoolctl import threadpool_limits
 
         # One thread: the products are small, and two wait for each other.
-        with threadpool_limits(limits=1), interrupts(self.interrupt):
+        with threadpool_limits(limits=1), interrupts(self._signalled):
             self.begin()
             try:
                 if watch:
@@ -252,6 +254,13 @@ class Loop:
             stopped=self.state is State.STOPPED,
         )
 
+    def _signalled(self, number: int) -> None:
+        """Whoever asks to terminate does not wait until someone says that the robot may go on."""
+        if number == signal.SIGTERM and self.actuation.conduct.policy.interrupt is Answer.HOLD:
+            self.finish("it was asked to terminate")
+        else:
+            self.interrupt()
+
     # --------------------------------------------------------------------------------------------------- its stages
 
     def _sense(self, now: float) -> None:
@@ -272,9 +281,11 @@ class Loop:
         estimate = self.perception.last
         if estimate is None:
             return
-        response = self._timed("respond", partial(self.player.respond, self.perception.session, estimate))
-        if response is not None:
-            self.journal.response(now, response)
+        if estimate is not self._responded:  # else the last response still says all there is to say
+            self._responded = estimate
+            response = self._timed("respond", partial(self.player.respond, self.perception.session, estimate))
+            if response is not None:
+                self.journal.response(now, response)
         if not self.player.over:
             self._closing = inf
         elif self._closing == inf:  # what is left of it is played to its end

@@ -125,7 +125,11 @@ class Synchroniser:
         track = self._tracks[sensor]
         if not track.stamps:
             raise DataError(f"{sensor}: expected samples, got none that could be used")
-        return track.clock.time_of(track.stamps[0]), track.clock.time_of(track.stamps[-1])
+        first, last = (track.clock.time_of(track.stamps[i]) for i in (0, -1))
+        nudge = float(np.spacing(abs(first)))
+        while track.clock.stamp_at(first) < track.stamps[0]:  # rounding: it would be before all that was read
+            first, nudge = first + nudge, 2 * nudge
+        return first, last
 
 
 @dataclass(frozen=True)
@@ -192,6 +196,18 @@ def combine(
     told. Raises OptionError for a rate that is not positive, DataError for sensors
     that were not recorded at the same time, or one whose clock was set on the way.
     """
+    return combine_counted(recordings, rate, channels, staleness=staleness, name=name)[0]
+
+
+def combine_counted(
+    recordings: Mapping[str, SensorRecording],
+    rate: float,
+    channels: Sequence[Channel] = (),
+    *,
+    staleness: float | Mapping[str, float] | None = None,
+    name: str = "demonstration",
+) -> tuple[Demonstration, Mapping[str, Mapping[Fate, int]]]:
+    """What `combine` gives, and by sensor, what became of its samples."""
     if not 0 < rate < inf:
         raise OptionError(f"expected a rate > 0 [1/s], got {rate}")
     if staleness is None:
@@ -219,7 +235,7 @@ def combine(
         raise DataError(f"{name}: expected sensors that were recorded at the same time, got {got}")
     end = min(span[1] for sensor, span in spans.items() if last - span[1] <= holds[sensor])
     times = begin + np.arange(int((end - begin) * rate * (1 + 1e-12)) + 1) / rate
-    return Demonstration(times, np.stack([together.at(float(time)) for time in times]), name)
+    return Demonstration(times, np.stack([together.at(float(time)) for time in times]), name), together.counts
 
 
 def by_channel(staleness: float | Mapping[str, float], names: Sequence[str]) -> dict[str, float]:

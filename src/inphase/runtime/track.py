@@ -33,6 +33,11 @@ class Fate(str, enum.Enum):
     BROKEN = "dropped: a stamp that is not finite"
     RESTARTED = "the device's clock was set: begun anew with it, and all before forgotten"
 
+    @property
+    def dropped(self) -> bool:
+        """Whether the sample was left out."""
+        return self in (Fate.DUPLICATED, Fate.LATE, Fate.AHEAD, Fate.EMPTY, Fate.BROKEN)
+
 
 class Track:
     """One sensor's samples of the last `history` [s], by stamp, with the clock that made the stamps.

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Float
@@ -16,6 +16,11 @@ from inphase.channels import Channel, make_channels, spread
 from inphase.errors import OptionError, listing
 from inphase.io import read_episode, read_recording
 from inphase.model import Model
+from inphase.runtime.adapters.bags import bag_sensor
+from inphase.runtime.adapters.lsl import LslMarkers, LslSensor
+from inphase.runtime.adapters.ros1_robot import Ros1Robot
+from inphase.runtime.adapters.ros1_sensor import Ros1Sensor
+from inphase.runtime.adapters.ros1_services import Ros1Services
 from inphase.runtime.configuration.section import Section
 from inphase.runtime.device import Robot, Sensor, Signal
 from inphase.runtime.devices import ReplaySensor, SimulatedPartner, SimulatedRobot
@@ -52,6 +57,8 @@ def simulated_partner(
     noise: float = 0.01,
 ) -> Sensor:
     """A partner who moves as the model says partners do."""
+    if seed < 0:
+        raise OptionError(f"expected a seed >= 0, got {seed}")
     return SimulatedPartner(model, seed, rate=rate, tempo=tempo, pauses=pauses, noise=noise, name=name)
 
 
@@ -86,8 +93,17 @@ def by_name(numbers: Mapping[str, float], names: Sequence[str], otherwise: float
     return np.array([given.get(name, otherwise) for name in names], dtype=np.float64)
 
 
-SENSORS: Mapping[str, Maker] = MappingProxyType({"replay": replay, "simulated_partner": simulated_partner})
-ROBOTS: Mapping[str, Maker] = MappingProxyType({"simulated_robot": simulated_robot})
+SENSORS: Mapping[str, Maker] = MappingProxyType(
+    {
+        "replay": replay,
+        "simulated_partner": simulated_partner,
+        "bag": bag_sensor,
+        "lsl": LslSensor,
+        "ros1": Ros1Sensor,
+    }
+)
+ROBOTS: Mapping[str, Maker] = MappingProxyType({"simulated_robot": simulated_robot, "ros1": Ros1Robot})
+OUTPUTS: Mapping[str, Maker] = MappingProxyType({"lsl": LslMarkers, "ros1": Ros1Services})
 
 
 def make_device(section: Section, makers: Mapping[str, Maker], **known: Any) -> Any:
@@ -97,15 +113,29 @@ def make_device(section: Section, makers: Mapping[str, Maker], **known: Any) -> 
     file does not say, as the model: those get it that ask for it by a parameter of that name. Raises OptionError with
     the line for an unknown device, one that wants what is not there, or entries that do not fit.
     """
-    others = {point.name: point for point in entry_points(group=GROUP)}
     device = section.get("device", str)
-    if device in makers:
-        make = makers[device]
-    elif device in others:
-        make = others[device].load()
-    else:
-        raise section.fail(f"there is no device {device!r}; one of {listing([*makers, *others])}", "device")
+    make = _maker(section, device, makers)
     wanted = [name for name in known if name in inspect.signature(make).parameters]
     if any(known[name] is None for name in wanted):
         raise section.fail(f"{device} needs a model: expected model = a file, at the top, got none", "device")
-    return section.call(make, ("device", "clock"), **{name: known[name] for name in wanted})
+    try:
+        return section.call(make, ("device",), **{name: known[name] for name in wanted})
+    except (ImportError, OSError) as error:  # a port that is not there, a driver that is not installed
+        raise section.fail(f"{device} cannot be made: {error}", "device") from error
+
+
+def _maker(section: Section, device: str, makers: Mapping[str, Maker]) -> Maker:
+    if device in makers:
+        return makers[device]
+    others = {point.name: point for point in entry_points(group=GROUP)}
+    if device not in others:
+        names = listing(dict.fromkeys([*makers, *others]))
+        raise section.fail(f"there is no device {device!r}; one of {names}", "device")
+    source = others[device].value
+    try:
+        make = others[device].load()
+    except (ImportError, AttributeError) as error:
+        raise section.fail(f"{device}, of {source}, cannot be loaded: {error}", "device") from error
+    if not callable(make):
+        raise section.fail(f"{device}: expected a class or function in {source}, got {make!r}", "device")
+    return cast(Maker, make)

@@ -2,37 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from inphase.errors import listing
+from inphase.channels import match
+from inphase.errors import InphaseError, listing
 from inphase.filters import FILTERS, RECOMMENDED
 from inphase.io.toml import read_toml
 from inphase.model import Model
 from inphase.runtime.clock import Clock
 from inphase.runtime.conduct import Conduct
-from inphase.runtime.configuration.devices import ROBOTS, SENSORS, Maker, by_name, make_device
+from inphase.runtime.configuration.devices import ROBOTS, SENSORS, Maker, make_device
+from inphase.runtime.configuration.robot_conduct import GUARDING, read_conduct, read_policy
 from inphase.runtime.configuration.section import Section
-from inphase.runtime.device import Robot, Sensor
+from inphase.runtime.device import Robot, Sensor, check_signals
 from inphase.runtime.journal import Journal
-from inphase.runtime.limits import Limits
 from inphase.runtime.loop import Loop, Rates
-from inphase.runtime.perception import Sight
+from inphase.runtime.perception import Perception, Sight, check_names
 from inphase.runtime.playing import Play
 from inphase.runtime.replay import provenance_of
-from inphase.runtime.safety import Policy
 from inphase.runtime.smoothing import AlphaBeta
+from inphase.runtime.synchronise import by_channel
 from inphase.session import Session
 
 TABLES = ("filter", "rates", "sensing", "sensors", "robot", "response", "smoothing", "safety", "recording", "outputs")
 OF_DEMONSTRATIONS = "demonstrations"
-LIMITS = ("low", "high", "velocity", "acceleration")
-GUARDING = ("retreat", "silence", "late_commands", "watchdog")  # what the safety table says besides the policy
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +55,12 @@ class Configuration:
         if not tables:
             raise self.root.fail("expected a table [sensors.NAME] for each sensor, got none", "sensors")
         makers = {**SENSORS, **self.makers}
-        return [make_device(table, makers, name=name, model=self.model) for name, table in tables.items()]
+        made = list[Sensor]()
+        for name, table in tables.items():
+            sensor = make_device(table.without("clock"), makers, name=name, model=self.model)
+            _check_kind(table, sensor, Sensor)
+            made.append(sensor)
+        return made
 
     def shared_clocks(self) -> list[str]:
         """The sensors that stamp with the clock of the loop."""
@@ -71,22 +73,22 @@ class Configuration:
         if "device" not in section:
             raise self.root.fail("expected a table [robot] with a device, got none", "robot")
         controlled = None if model is None else model.channels[len(model.observed) :]
-        inner = Section(
-            section.file,
-            section.text,
-            section.folder,
-            {key: section.get(key, Any) for key in section if key != "limits"},
-            section.path,
-        )
-        robot: Robot = make_device(inner, {**ROBOTS, **self.makers}, name="robot", model=model, controlled=controlled)
+        table = section.without("limits")
+        robot: Robot = make_device(table, {**ROBOTS, **self.makers}, name="robot", model=model, controlled=controlled)
+        _check_kind(section, robot, Robot)
         return robot
 
     def session(self) -> Session:
         """A new session of the model; raises OptionError where the file names none."""
         model, section = self.needed_model(), self.section("filter")
         name, seed, options = self._filter()
-        with section.naming():
-            return model.session(name, seed, **options)
+        with section.naming([*options]):
+            try:
+                return model.session(name, seed, **options)
+            except InphaseError:
+                raise
+            except (TypeError, ValueError, OverflowError, MemoryError) as error:  # as of a text for a number
+                raise section.fail(f"{name} cannot be made with {options}: {error}") from error
 
     def needed_model(self) -> Model:
         """The model; raises OptionError where the file names none."""
@@ -96,13 +98,14 @@ class Configuration:
 
     def loop(self, clock: Clock, journal: Journal | None = None) -> Loop:
         """The loop that the file describes, with new devices, which are not started yet."""
-        robot = self.robot()
+        session, robot, sensors = self.session(), self.robot(), self.sensors()
         rates, play, sight = self.rates(), self.section("response").call(Play), self.section("sensing").call(Sight)
+        self._check_fit(session, sensors, robot, sight)
         conduct = self.conduct(robot)
-        with self.root.naming():
+        with self.section("safety").naming(GUARDING):  # how patient a watchdog can be is known where it is made
             return Loop(
-                self.session(),
-                self.sensors(),
+                session,
+                sensors,
                 robot,
                 clock,
                 conduct,
@@ -119,22 +122,24 @@ class Configuration:
 
     def conduct(self, robot: Robot) -> Conduct:
         """Limits, smoothing and safety of that robot."""
-        names, section = [signal.name for signal in robot.signals], self.section("safety")
-        policy = section.call(Policy, GUARDING)
-        known = {
-            "limits": self._limits(names),
-            "smoothing": self.section("smoothing").call(AlphaBeta),
-            "policy": policy,
-        }
-        pose = None
-        if "retreat" in section:
-            with section.naming(["retreat"]):
-                pose = by_name(section.get("retreat", Mapping[str, float]), names, np.nan)
-            if missing := [name for name, value in zip(names, pose, strict=True) if np.isnan(value)]:
-                raise section.fail(f"expected a position of every signal, got none of {listing(missing)}", "retreat")
-        return section.call(
-            Conduct, [*(key for key in section if key not in GUARDING), "retreat"], retreat=pose, **known
-        )
+        return read_conduct(self.root, [signal.name for signal in robot.signals])
+
+    def _check_fit(self, session: Session, sensors: list[Sensor], robot: Robot, sight: Sight) -> None:
+        """What a loop would refuse too, said at the table it is about."""
+        channels, observed = session.model.channels, len(session.model.observed)
+        with self.section("sensors").naming([sensor.name for sensor in sensors]):
+            check_names(sensors)
+            check_signals(channels[:observed], sensors)
+        with self.section("robot").naming():
+            check_signals(channels[observed:], [robot])
+        section = self.section("sensing")
+        names = [signal.name for sensor in sensors for signal in sensor.signals]
+        with section.at(*(["staleness"] if "staleness" in section else [])):
+            by_channel(sight.staleness, names)
+        with section.at(*(["needed"] if "needed" in section else [])):
+            match(sight.needed, session.model.observed)
+        with section.naming(["staleness", "delay"]):
+            Perception(session, sensors, sight, 1 / self.rates().sense, self.shared_clocks())
 
     def provenance(self) -> dict[str, str]:
         """What a recording says of where it comes from."""
@@ -145,27 +150,17 @@ class Configuration:
         name, seed = section.get("name", str, RECOMMENDED), section.get("seed", int, 0)
         if name not in FILTERS:
             raise section.fail(f"there is no filter {name!r}; one of {listing(FILTERS)}", "name")
+        if seed < 0:
+            raise section.fail(f"expected a seed >= 0, got {seed}", "seed")
         return name, seed, {key: section.get(key, Any) for key in section if key not in ("name", "seed")}
-
-    def _limits(self, names: Sequence[str]) -> Limits:
-        section = self.section("robot").section("limits")
-        numbers: dict[str, dict[str, float]] = {key: {} for key in LIMITS}
-        for pattern, table in section.sections().items():
-            table.only(*LIMITS)
-            with section.naming([pattern]):
-                for key in table:
-                    by_name({pattern: 0.0}, names, 0.0)  # a pattern that fits nothing is a mistake
-                    numbers[key][pattern] = table.get(key, float)
-        unlimited = {"low": -np.inf, "high": np.inf, "velocity": np.inf, "acceleration": np.inf}
-        with section.naming():
-            return Limits(**{key: by_name(numbers[key], names, unlimited[key]) for key in LIMITS})
 
 
 def read_configuration(path: str | PathLike[str], makers: Mapping[str, Maker] | None = None) -> Configuration:
     """What a TOML file says of an interaction: docs/live.md tells of every entry.
 
     makers: devices of one's own, by the name that the file calls them. Raises DataError for a file that cannot be read
-    or is no TOML, ModelFileError for a model that is none, OptionError, with the line, for an entry that is not known.
+    or is no TOML, and OptionError, with the line, for whatever in it is not known, of another type or out of range, and
+    for a model that cannot be read.
     """
     path = Path(path)
     table = read_toml(path)
@@ -180,13 +175,13 @@ def read_configuration(path: str | PathLike[str], makers: Mapping[str, Maker] | 
     if file is None:
         model = None
     else:
-        with root.naming(["model"]):
+        with root.at("model"):
             model = Model.load(file)
     configuration = Configuration(path, text, root, model, dict(makers or {}))
     configuration.rates()
     for name, kind in (("response", Play), ("sensing", Sight), ("smoothing", AlphaBeta)):
         root.section(name).call(kind)
-    root.section("safety").call(Policy, GUARDING)
+    read_policy(root)
     configuration._filter()
     return configuration
 
@@ -198,6 +193,9 @@ def _clock(sensor: Section) -> str:
     return clock
 
 
-def no_limits(limits: Limits, names: Sequence[str]) -> tuple[str, ...]:
-    """The signals that may move as fast as they like."""
-    return tuple(name for name, velocity in zip(names, limits.velocity, strict=True) if velocity == np.inf)
+def _check_kind(section: Section, device: object, kind: type) -> None:
+    """Raise OptionError for a device of another kind: what is made by others may be anything."""
+    parts = ("name", "signals", "start", "stop", *(("read",) if kind is Sensor else ("state", "command")))
+    if missing := [part for part in parts if not hasattr(device, part)]:
+        what = kind.__name__.lower()
+        raise section.fail(f"expected a {what}, got {device!r}, which has no {listing(missing)}", "device")

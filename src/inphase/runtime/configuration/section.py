@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import enum
 import inspect
-import types
-import typing
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
-
 from inphase.errors import InphaseError, OptionError, listing
+from inphase.runtime.configuration.entry_types import converted, hints_of, words
 from inphase.runtime.configuration.toml_lines import line_of
 
 T = TypeVar("T")
-WORDS = {float: "a number", int: "a whole number", str: "a text", bool: "true or false", Path: "a path"}
+EXPECTED = re.compile(r", got |; ")  # what a message says before is about entries, behind it are values
+LONGEST = 80  # of a value in a message
 
 
 class Section:
@@ -55,20 +53,25 @@ class Section:
         """The table of that name, empty where there is none."""
         table = self._table.get(key, {})
         if not isinstance(table, Mapping):
-            raise self.fail(f"expected a table, got {table!r}", key)
+            raise self.fail(f"expected a table, got {_shown(table)}", key)
         return Section(self.file, self.text, self.folder, table, (*self.path, key))
 
     def sections(self) -> dict[str, Section]:
         """All entries, which have to be tables."""
         return {key: self.section(key) for key in self._table}
 
+    def without(self, *names: str) -> Section:
+        """The same table, less these entries."""
+        rest = {key: value for key, value in self._table.items() if key not in names}
+        return Section(self.file, self.text, self.folder, rest, self.path)
+
     def get(self, key: str, kind: Any, default: Any = inspect.Parameter.empty) -> Any:
         """The entry as that type; raises OptionError where it is not there and there is no default."""
         if key not in self._table:
             if default is inspect.Parameter.empty:
-                raise self.fail(f"expected {key} = {_words(kind)}, got none")
+                raise self.fail(f"expected {key} = {words(kind)}, got none")
             return default
-        return self._convert(self._table[key], kind, key)
+        return self._convert(key, kind)
 
     def call(self, make: Callable[..., T], without: Sequence[str] = (), **given: Any) -> T:
         """What `make` makes of the entries as its keywords; `given` are not in the file, nor are those in `without`.
@@ -76,21 +79,23 @@ class Section:
         Raises OptionError, with its line, for an entry that `make` does not know, a wrong type, one that is missing,
         and whatever `make` says is wrong.
         """
-        hints = _hints(make)
+        hints, parameters = hints_of(make), inspect.signature(make).parameters
         known = {
             name: parameter
-            for name, parameter in inspect.signature(make).parameters.items()
-            if name not in given and name not in without and parameter.kind is not parameter.VAR_KEYWORD
+            for name, parameter in parameters.items()
+            if name not in (*given, *without)
+            and parameter.kind in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY)
         }
+        takes_all = any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters.values())
         entries = [key for key in self._table if key not in without]
         for key in entries:
-            if key not in known:
+            if key in given or not (key in known or takes_all):
                 raise self.fail(f"is not known here; one of {listing(known)}", key)
         for name, parameter in known.items():
             if parameter.default is parameter.empty and name not in entries:
-                raise self.fail(f"expected {name} = {_words(hints.get(name, Any))}, got none")
-        values = {key: self._convert(self._table[key], hints.get(key, Any), key) for key in entries}
-        with self.naming(entries):
+                raise self.fail(f"expected {name} = {words(hints.get(name, Any))}, got none")
+        values = {key: self._convert(key, hints.get(key, Any) if key in known else Any) for key in entries}
+        with self.naming([*self._table]):
             return make(**values, **given)
 
     @contextmanager
@@ -99,99 +104,54 @@ class Section:
         try:
             yield
         except InphaseError as error:
-            message = str(error)
-            if message.startswith(f"{self.file}, line "):
-                raise
-            if self.path:
-                message = message.removeprefix(f"{self.path[-1]}: ")
-            named = [key for key in keys if key in message]
-            raise self.fail(message, *named[:1]) from None
+            raise self._placed(error, *self._named(str(error), keys)) from None
 
-    def _convert(self, value: Any, kind: Any, *keys: str) -> Any:
+    @contextmanager
+    def at(self, *keys: str) -> Iterator[None]:
+        """Say where: what is raised inside gets the line of that key, whatever it names."""
         try:
-            return _converted(value, kind, self.folder)
-        except ValueError as error:
-            raise self.fail(f"expected {error}, got {value!r}", *keys) from None
+            yield
+        except InphaseError as error:
+            raise self._placed(error, *keys) from None
 
+    def _placed(self, error: InphaseError, *keys: str) -> InphaseError:
+        message = str(error)
+        if message.startswith(f"{self.file}, line "):
+            return error
+        return self.fail(message.removeprefix(f"{self.path[-1]}: ") if self.path else message, *keys)
 
-def _hints(make: Callable[..., Any]) -> dict[str, Any]:
-    try:
-        return typing.get_type_hints(make.__init__ if inspect.isclass(make) else make)
-    except NameError:  # a type that is only there for a type checker: what it takes, it has to check itself
-        return {}
+    def _named(self, message: str, keys: Sequence[str]) -> tuple[str, ...]:
+        """Which of these entries a message is about; or which name in one that is a table or a list."""
+        about = EXPECTED.split(message)[0]
+        for key in keys:
+            inside = self._table.get(key)
+            for name in inside if isinstance(inside, (Mapping, list)) else ():
+                if isinstance(name, str) and repr(name) in about:
+                    return (key, name) if isinstance(inside, Mapping) else (key,)
+        found = ((re.search(rf"(?<!\w){re.escape(key)}(?!\w)", about), key) for key in keys)
+        return tuple(key for _, key in sorted((at.start(), key) for at, key in found if at)[:1])
 
-
-def _converted(value: Any, kind: Any, folder: Path) -> Any:
-    """The value as that type; raises ValueError that says what was expected."""
-    origin, inner = typing.get_origin(kind), typing.get_args(kind)
-    if origin in (typing.Union, types.UnionType):
-        return _converted_to_one(value, [part for part in inner if part is not type(None)], folder)
-    if isinstance(kind, type) and issubclass(kind, enum.Enum):
-        if value not in [member.value for member in kind]:
-            raise ValueError(f"one of {listing(str(member.value) for member in kind)}")
-        return kind(value)
-    if kind is Path:
-        if not isinstance(value, str) or not value:
-            raise ValueError(_words(kind))
-        return folder / Path(value).expanduser()
-    if kind in WORDS:
-        return _plain(value, kind)
-    if origin in (dict, Mapping) or kind in (dict, Mapping) or getattr(origin, "__name__", "") == "Mapping":
-        if not isinstance(value, Mapping):
-            raise ValueError(_words(kind))
-        return {key: _converted(part, inner[1], folder) if inner else part for key, part in value.items()}
-    if origin in (tuple, list) or getattr(origin, "__name__", "") == "Sequence":
-        if not isinstance(value, list):
-            raise ValueError(_words(kind))
-        if origin is tuple and inner and inner[-1] is not Ellipsis:
-            if len(value) != len(inner):
-                raise ValueError(_words(kind))
-            return tuple(_converted(part, k, folder) for part, k in zip(value, inner, strict=True))
-        return tuple(_converted(part, inner[0], folder) if inner else part for part in value)
-    if _is_array(kind):
-        return _array(value)
-    return value
-
-
-def _converted_to_one(value: Any, kinds: Sequence[Any], folder: Path) -> Any:
-    expected = []
-    for kind in kinds:
+    def _convert(self, key: str, kind: Any) -> Any:
+        value = self._table[key]
         try:
-            return _converted(value, kind, folder)
+            return converted(value, kind, self.folder)
         except ValueError as error:
-            expected.append(str(error))
-    raise ValueError(" or ".join(dict.fromkeys(expected)))
+            place, got = self._narrowed(key, kind)
+            raise self.fail(f"expected {error}, got {_shown(got)}", *place) from None
+
+    def _narrowed(self, key: str, kind: Any) -> tuple[tuple[str, ...], Any]:
+        """What does not convert: the entry, or the first name in it where it is a table as it should be."""
+        value = self._table[key]
+        for name in value if isinstance(value, Mapping) else ():
+            with suppress(ValueError):
+                converted({}, kind, self.folder)  # else no table is wanted at all
+                try:
+                    converted({name: value[name]}, kind, self.folder)
+                except ValueError:
+                    return (key, name), value[name]
+        return (key,), value
 
 
-def _plain(value: Any, kind: Any) -> Any:
-    if kind is float and isinstance(value, int) and not isinstance(value, bool):
-        return float(value)
-    if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
-        raise ValueError(WORDS[kind])
-    return value
-
-
-def _is_array(kind: Any) -> bool:
-    return isinstance(kind, type) and getattr(kind, "array_type", None) is np.ndarray  # of jaxtyping
-
-
-def _array(value: Any) -> Any:
-    try:
-        return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueError("numbers") from None
-
-
-def _words(kind: Any) -> str:
-    """What a message calls a type."""
-    inner = [part for part in typing.get_args(kind) if part is not type(None)]
-    name = getattr(typing.get_origin(kind), "__name__", "")
-    if kind in WORDS:
-        return WORDS[kind]
-    if isinstance(kind, type) and issubclass(kind, enum.Enum):
-        return f"one of {listing(str(member.value) for member in kind)}"
-    if name == "Mapping" and len(inner) == 2:
-        return f"a table of {_words(inner[1])} by name"
-    if name in ("tuple", "list", "Sequence") and inner:
-        return f"a list: {_words(inner[0])} each"
-    return " or ".join(dict.fromkeys(map(_words, inner))) if inner else "numbers"
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"

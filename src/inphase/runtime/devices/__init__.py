@@ -2,6 +2,7 @@
 
 from inphase.runtime.devices.faults import Dead, Drifting, Duplicated, Late, NanBursting, Reordered
 from inphase.runtime.devices.replay_sensor import ReplaySensor
+from inphase.runtime.devices.robot_state import RobotState
 from inphase.runtime.devices.simulated_partner import SimulatedPartner
 from inphase.runtime.devices.simulated_robot import SimulatedRobot
 
@@ -13,6 +14,7 @@ __all__ = [
     "NanBursting",
     "Reordered",
     "ReplaySensor",
+    "RobotState",
     "SimulatedPartner",
     "SimulatedRobot",
 ]
