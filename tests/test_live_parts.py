@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from interactions import shapes_unchecked
 from rigs import Watched
@@ -259,7 +259,11 @@ def test_what_is_wanted_is_ahead_in_phase_or_in_time(phase, ahead, since):
     assert played(Play(control_lag=ahead), phase, 10.0 + since) == pytest.approx(expected, abs=1e-9)
 
 
-@given(st.floats(0, 1), st.floats(0, 0.4), st.floats(0, 2.0), st.booleans())
+@example(0.7, 0.0, 0.0, by_phase=True)  # beyond it
+@example(0.5, 0.2, 0.0, by_phase=True)  # looking beyond it
+@example(0.5, 0.2, 0.0, by_phase=False)
+@example(0.1, 0.2, 0.0, by_phase=True)
+@given(st.floats(0, 1), st.floats(0, 0.4), st.floats(0, 2.0), by_phase=st.booleans())
 def test_nothing_beyond_the_stop_is_ever_wanted_and_nothing_before_the_start(phase, ahead, since, by_phase):
     play = Play(start=0.2, stop=0.6, samples=200, **{"lookahead" if by_phase else "control_lag": ahead})
     value = played(play, phase, 10.0 + since)
@@ -460,7 +464,7 @@ def thrice(call) -> None:
 
 def test_a_signal_is_a_word_twice_and_then_an_end():
     said, before = [], signal.getsignal(signal.SIGINT)
-    with pytest.raises(KeyboardInterrupt), interrupts(lambda: said.append(1)):
+    with pytest.raises(KeyboardInterrupt), interrupts(lambda number: said.append(1)):
         thrice(lambda: os.kill(os.getpid(), signal.SIGINT))
     assert said == [1, 1]
     assert signal.getsignal(signal.SIGINT) is before
@@ -470,14 +474,14 @@ def test_the_handlers_of_others_stay_and_other_threads_have_none():
     said, own = [], []
     before = signal.signal(signal.SIGTERM, lambda number, frame: own.append(number))
     try:
-        with interrupts(lambda: said.append(1)):
+        with interrupts(lambda number: said.append(1)):
             os.kill(os.getpid(), signal.SIGTERM)
     finally:
         signal.signal(signal.SIGTERM, before)
     assert (said, own) == ([], [signal.SIGTERM])
 
     def inside() -> None:
-        with interrupts(lambda: None):
+        with interrupts(lambda number: None):
             said.append(2)
 
     thread = threading.Thread(target=inside)

@@ -178,7 +178,7 @@ def two_sensors(model: inphase.Model, slow: float = 0.05) -> tuple[list[ReplaySe
 def test_two_sensors_of_other_rates_are_one_session_fed_by_hand(model):
     sensors, readings = two_sensors(model)
     run = bench(
-        model, sensors=sensors, rates=Rates(200.0, None, 10.0, 30.0), shared_clock=tuple(s.name for s in sensors)
+        model, sensors=sensors[::-1], rates=Rates(200.0, None, 10.0, 30.0), shared_clock=tuple(s.name for s in sensors)
     )
     taken = observed_by(run)
     run.run(1.5)
@@ -503,3 +503,17 @@ def test_a_reset_begins_a_new_interaction_as_a_new_session_would(model):
     for time, values, estimate in taken[begins:]:
         assert identical(estimate, by_hand.observe(time, values))
     assert [event.kind for event in run.told].count("reset") == 1
+
+
+def test_what_was_read_before_a_reset_and_comes_after_it_is_of_the_interaction_before(model):
+    late = Late(SimulatedPartner(model, 1, rate=50.0, tempo=1.0), by=0.1)
+    run = bench(model, sensors=[late])
+    taken = observed_by(run)
+    run.clock.at(0.5, run.loop.reset)
+    run.run(1.0)
+    (at,) = [event.time for event in run.told if event.kind == "reset"]
+    before, after = [t for t, _, _ in taken if t <= at], [t for t, _, _ in taken if t > at]
+    assert at == pytest.approx(0.5)
+    assert before == sorted(before)
+    assert max(before) == pytest.approx(0.38, abs=0.03)
+    assert min(after) == pytest.approx(0.52)

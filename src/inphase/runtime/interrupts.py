@@ -14,13 +14,8 @@ PATIENCE = 2  # times that they are words
 
 
 @contextmanager
-<<<<<<< HEAD
-def interrupts(call: Callable[[], object]) -> Iterator[None]:
-    """Inside, those signals call `call`; the third raises KeyboardInterrupt, wherever the program is then.
-=======
 def interrupts(call: Callable[[int], object]) -> Iterator[None]:
     """Inside, those signals call `call` with their number; the third is a KeyboardInterrupt wherever the program is.
->>>>>>> origin/HEAD
 
     Handlers of others stay, and so does all outside of the main thread, where Python has no signals.
     """
@@ -35,11 +30,7 @@ def interrupts(call: Callable[[int], object]) -> Iterator[None]:
         came += 1
         if came > PATIENCE:
             raise KeyboardInterrupt
-<<<<<<< HEAD
-        call()
-=======
         call(number)
->>>>>>> origin/HEAD
 
     try:
         for number in SIGNALS:
