@@ -259,11 +259,11 @@ def test_what_is_wanted_is_ahead_in_phase_or_in_time(phase, ahead, since):
     assert played(Play(control_lag=ahead), phase, 10.0 + since) == pytest.approx(expected, abs=1e-9)
 
 
-@example(0.7, 0.0, 0.0, by_phase=True)  # beyond it
-@example(0.5, 0.2, 0.0, by_phase=True)  # looking beyond it
-@example(0.5, 0.2, 0.0, by_phase=False)
-@example(0.1, 0.2, 0.0, by_phase=True)
-@given(st.floats(0, 1), st.floats(0, 0.4), st.floats(0, 2.0), by_phase=st.booleans())
+@example(phase=0.7, ahead=0.0, since=0.0, by_phase=True)  # beyond it
+@example(phase=0.5, ahead=0.2, since=0.0, by_phase=True)  # looking beyond it
+@example(phase=0.5, ahead=0.2, since=0.0, by_phase=False)
+@example(phase=0.1, ahead=0.2, since=0.0, by_phase=True)
+@given(phase=st.floats(0, 1), ahead=st.floats(0, 0.4), since=st.floats(0, 2.0), by_phase=st.booleans())
 def test_nothing_beyond_the_stop_is_ever_wanted_and_nothing_before_the_start(phase, ahead, since, by_phase):
     play = Play(start=0.2, stop=0.6, samples=200, **{"lookahead" if by_phase else "control_lag": ahead})
     value = played(play, phase, 10.0 + since)
