@@ -32,9 +32,10 @@ lint: $(VENV)/dev  ## style, types and arrows
 	$(if $(shell $(BIN)/python -c 'import sys; print("y" * (sys.version_info >= (3, 11)))' 2>/dev/null),$(BIN)/mypy,@echo "mypy: needs Python 3.11 or newer")
 	$(BIN)/lint-imports
 
-bench: $(VENV)/demo $(ROS1)  ## how long a step takes, beside plain loops and the floor; then a partner at 500 Hz
+bench: $(VENV)/demo $(ROS1)  ## how long a step takes, beside plain loops and the floor; then live, for half an hour
 	$(BIN)/python benchmarks/speed.py $(ARGS)
 	$(if $(ARGS),,$(BIN)/python benchmarks/live.py)
+	$(if $(ARGS),,$(BIN)/python benchmarks/loop.py)
 	$(if $(ARGS),,$(if $(ROS1),$(BIN)/python benchmarks/ros1.py,@echo "benchmarks/ros1.py: needs ROS 1 (docs/ros.md)"))
 
 growth: $(VENV)/demo  ## how the cost of a step grows: the picture in docs/performance.md

@@ -3,7 +3,7 @@
 Three processes beside a master of their own: one sends; one is the live loop, which looks for samples and commands at
 500 Hz; one receives. The latency that is added is the time from a joint state's sending to the arrival of the first
 command that knows of it, less what `observe` and `respond` took of it: two ways over TCP, and the wait for a cycle. A
-joint state is told by its number, which is the position of one joint more; commands arrive in their order.
+joint state is told by its number, which is the position of one joint more, and a command by the one in its header.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ ROWS = {
 }
 JOINTS, COMMANDS, NUMBER = "/benchmark/joints", "/benchmark/commands", "number"
 WANTED = 0.005  # [s] for the p99 of what is added
-WARM_UP = 100  # messages before those that count
+WARM_UP = 100  # messages before those that count; the first are heard by the robot, before the sensor begins
 
 
 def node(name: str) -> Any:
@@ -79,10 +79,12 @@ def send(rate: float, count: int, channels: int, observed: int) -> None:
 
 def receive(seconds: float) -> None:
     """Take commands until a line comes, or it takes too long; then say when each arrived."""
-    rospy, arrived = node("receive"), []
-    rospy.Subscriber(
-        COMMANDS, message_class(TRAJECTORY), lambda _: arrived.append(time.perf_counter()), tcp_nodelay=True
-    )
+    rospy, arrived = node("receive"), {}
+
+    def take(message: Any) -> None:
+        arrived[message.header.seq] = time.perf_counter()
+
+    rospy.Subscriber(COMMANDS, message_class(TRAJECTORY), take, tcp_nodelay=True)
     print("ready", flush=True)
     select.select([sys.stdin], [], [], seconds)
     print(json.dumps(arrived), flush=True)
@@ -113,9 +115,9 @@ class Counted(Ros1Robot):
 
     def command(self, command: Command) -> None:
         """Publish it."""
-        super().command(command)
         newest = next(reversed(self._sensor.came), -1)
         self.sent.append((newest, self._timed.spent.pop(newest, 0.0), time.perf_counter()))
+        super().command(command)
 
 
 class Timed:
@@ -170,7 +172,7 @@ def follow(
     loop.begin()
     loop.actuation.watchdog.start()
     following = clock.now() + DURATION
-    while len(sensor.came) < count and clock.now() < begun + seconds:
+    while count - 1 not in sensor.came and clock.now() < begun + seconds:
         clock.wait_until(loop.due)
         if clock.now() >= following:
             loop.reset()
@@ -222,17 +224,17 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
             sent = json.loads(sender.stdout.readline())
         receiver.stdin.write("\n")
         receiver.stdin.flush()
-        arrived = json.loads(receiver.stdout.readline())
+        arrived = {int(seq) - 1: then for seq, then in json.loads(receiver.stdout.readline()).items()}
     first: dict[int, int] = {}  # by number, the command that answered it first
     for place, (number, spent, _) in enumerate(commands):
-        if spent and number >= WARM_UP and place < len(arrived):
+        if spent and number >= WARM_UP and place in arrived:
             first.setdefault(number, place)
     received = np.array([came[k] for k in first])
     spent, commanded = np.array([commands[place][1:] for place in first.values()]).T
     left, there = np.array([(sent[k], arrived[place]) for k, place in first.items()]).T
     return {
-        "sent": count,
-        "lost_on_the_way_in": count - len(came),
+        "sent": count - WARM_UP,
+        "lost_on_the_way_in": sum(k not in came for k in range(WARM_UP, count)),
         "answered": len(first),
         "commands": len(commands),
         "lost_on_the_way_out": len(commands) - len(arrived),

@@ -235,6 +235,14 @@ def test_where_nothing_can_be_recorded_nothing_is_started(folder, run, monkeypat
     assert "cannot write /proc/live-" in err
 
 
+def test_outputs_are_checked_before_anything_is_started(folder, run, monkeypatch):
+    monkeypatch.setattr(SimulatedRobot, "start", lambda *_: pytest.fail("a device was started"))
+    Path("live.toml").write_text(GOOD + '[outputs.smoke]\ndevice = "signals"\n')
+    code, out, err = run("live.toml")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith("inphase: live.toml, line 19: outputs.smoke.device: there is no device 'signals'; one of ")
+
+
 # ------------------------------------------------------------------------------------------------ a process of its own
 
 

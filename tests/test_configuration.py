@@ -144,7 +144,7 @@ def build(read: Read, text: str, makers: Mapping[str, Callable[..., Any]] | None
 def test_what_it_says_is_what_is_run(read):
     configuration = read(GOOD)
     loop = configuration.loop(FakeClock())
-    assert loop.rates == Rates(60.0, respond=20.0, command=50.0)
+    assert loop.rates == Rates(sense=60.0, respond=20.0, command=50.0)
     assert (loop.player.play.samples, loop.player.play.control_lag) == (20, 0.05)
     conduct = loop.actuation.conduct
     assert conduct.limits.low.tolist() == [-2, -2]

@@ -68,14 +68,17 @@ def demo_live(
     if filter not in FILTERS:
         raise OptionError(f"unknown filter {filter!r}; one of {listing(FILTERS)}")
     check_picture(picture)
+    known = output / f"{shapes[0]}.inphase"
+    if not known.exists():
+        check_shapes(tuple(shapes))
     console = Output()
     console.print("Live: a simulated hand moves along x, in real time; a simulated robot answers along y.")
-    model = _model(console, output, shapes[0], calibrate)
+    model = _model(console, known, shapes[0], calibrate)
     if file.exists():
         console.print(f"{file} is there already and is run as it is; without it, a new one is written")
     else:
         with whole_file(file) as temporary:
-            temporary.write_text(live_toml(model, f"{shapes[0]}.inphase", filter, seed), encoding="utf-8")
+            temporary.write_text(live_toml(model, known.name, filter, seed), encoding="utf-8")
         console.print(f"wrote {file}, which says all that follows: copy it for an interaction of your own")
     partners, robots = list[SimulatedPartner](), list[Watched]()
     configuration = read_configuration(file, _remembering(partners, robots))
@@ -94,15 +97,13 @@ def demo_live(
     return code
 
 
-def _model(console: Output, output: Path, shape: str, calibrate: bool) -> Model:
+def _model(console: Output, file: Path, shape: str, calibrate: bool) -> Model:
     """The model that is there, or a new one."""
-    file = output / f"{shape}.inphase"
     if file.exists():
         console.print(f"took the model {file}, which is there already")
         return Model.load(file)
-    check_shapes((shape,))
-    export_handwriting(shape, output / shape)
-    dataset = load(output / shape, observed=["x"], controlled=["y"], units={"*": "mm"})
+    export_handwriting(shape, file.with_suffix(""))
+    dataset = load(file.with_suffix(""), observed=["x"], controlled=["y"], units={"*": "mm"})
     dataset = dataset.without(-1)  # as the other demo does, which plays it afterwards
     with working(f"{shape}: learning from {len(dataset)} demonstrations") as progress:
         model = fit(dataset, calibrate=calibrate, jobs=processes(), progress=progress)

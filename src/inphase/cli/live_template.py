@@ -25,6 +25,7 @@ seed = {seed}  # of its random numbers
 
 [rates]  # how often, in a second,
 sense = 60  # sensors are looked at,
+# observe = 30  # what came since is observed as one, averaged; without it, every reading by itself,
 respond = 30  # the response is made anew,
 command = 60  # the robot is sent where to be
 
@@ -80,6 +81,12 @@ late_commands = 3  # left out in a row, the loop is too slow
 [recording]  # without this table nothing is recorded
 folder = "runs"
 capacity = 4096  # samples, responses and commands that may wait for the disk
+
+# [outputs.services]  # what else is offered to others, such as ROS services or LSL markers
+# device = "ros1"
+
+# [demonstrations]  # `inphase record` takes them with these sensors
+# folder = "demonstrations"
 """
 
 

@@ -16,6 +16,7 @@ from inphase.runtime.configuration.toml_lines import line_of
 T = TypeVar("T")
 EXPECTED = re.compile(r", got |; ")  # what a message says before is about entries, behind it are values
 LONGEST = 80  # of a value in a message
+NEEDED = object()  # in place of a default
 
 
 class Section:
@@ -65,10 +66,10 @@ class Section:
         rest = {key: value for key, value in self._table.items() if key not in names}
         return Section(self.file, self.text, self.folder, rest, self.path)
 
-    def get(self, key: str, kind: Any, default: Any = inspect.Parameter.empty) -> Any:
+    def get(self, key: str, kind: Any, default: Any = NEEDED) -> Any:
         """The entry as that type; raises OptionError where it is not there and there is no default."""
         if key not in self._table:
-            if default is inspect.Parameter.empty:
+            if default is NEEDED:
                 raise self.fail(f"expected {key} = {words(kind)}, got none")
             return default
         return self._convert(key, kind)
