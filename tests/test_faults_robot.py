@@ -94,13 +94,15 @@ def test_a_crash(model, tmp_path, seed, part):
     now = Conditions(model, seed)
     run = now.bench(tmp_path / "run.mcap", policy={"crash": now.answer})
     owner = run.loop.player if part == "wanted" else run.loop.perception.session
-    whole, failed = getattr(owner, part), list[float]()
+    whole, failed, done = getattr(owner, part), list[float](), list[float]()
 
     def failing(*given):
         if run.clock.now() >= now.onset:
             failed.append(run.clock.now())
             raise ZeroDivisionError(f"in {part}")
-        return whole(*given)
+        answer = whole(*given)
+        done.append(run.clock.now())
+        return answer
 
     setattr(owner, part, failing)
     with pytest.raises(ZeroDivisionError, match=part):
@@ -108,6 +110,8 @@ def test_a_crash(model, tmp_path, seed, part):
     check(run)
     check_reached(run, failed[0], now.answer, now.period)
     assert len(failed) == 1
+    if part == "observe":  # those before it, of the same look too
+        assert len(run.recorded().estimates) == len(done)
     assert run.robot.sent[-1][0] < ENDLESS  # it did not wait for anybody
 
 

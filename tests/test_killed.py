@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -17,7 +18,7 @@ from inphase.io import read_recorded_model, read_recording
 from inphase.runtime.replay import identical, replay
 
 KILLS = 20
-AT_ONCE = 4
+AT_ONCE = 5
 INTERACTION = """
 model = "model.inphase"
 [filter]
@@ -42,20 +43,20 @@ samples = 10
 folder = "runs"
 """
 FORKED = """
-import os, sys
+import os, signal, sys
+import mcap.writer, threadpoolctl  # with what is read on the way
+import inphase.cli.live
 from inphase.cli import main
-for folder in sys.argv[1:]:  # one process for each, all from this one that has read the library
-    if os.fork() == 0:
-        os.chdir(folder)
-        print(os.getpid(), flush=True)
-        devnull = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(devnull, 1), os.dup2(devnull, 2)
+signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+for line in sys.stdin:  # one process for each, all from this one that has read the library
+    pid = os.fork()
+    if pid == 0:
+        os.chdir(line.strip())
+        nowhere = os.open(os.devnull, os.O_RDWR)
+        for stream in (0, 1, 2):
+            os.dup2(nowhere, stream)
         os._exit(main(["live", "run.toml"]))
-while True:
-    try:
-        os.wait()
-    except ChildProcessError:
-        break
+    print(pid, flush=True)
 """
 
 
@@ -68,32 +69,32 @@ def test_killed_at_any_time(tmp_path: Path) -> None:
         folder.mkdir()
         (folder / "run.toml").write_text(INTERACTION)
         model.save(folder / "model.inphase")
-    for first in range(0, KILLS, AT_ONCE):
-        _kill(folders[first : first + AT_ONCE], rng)
+    program = [sys.executable, "-c", FORKED]
+    single = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    with subprocess.Popen(program, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=single) as parent:
+        for first in range(0, KILLS, AT_ONCE):
+            _kill(parent, folders[first : first + AT_ONCE], rng)
     with shapes_unchecked():
         counts = [_check(folder, model) for folder in folders]
     assert len(counts) == KILLS
     assert sum(count > 0 for count in counts) > KILLS / 2  # they did come to something
 
 
-def _kill(folders: list[Path], rng: np.random.Generator) -> None:
+def _kill(parent: subprocess.Popen[str], folders: list[Path], rng: np.random.Generator) -> None:
     """Start a run in each folder, and kill each at some time after its recording has begun."""
-    with subprocess.Popen(
-        [sys.executable, "-c", FORKED, *map(str, folders)],
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-    ) as parent:
-        assert parent.stdout is not None
-        lives = {int(parent.stdout.readline()): None for _ in folders}
-        # The lines come in the order of the forks or not: who writes into which folder does not matter.
+    assert parent.stdin is not None
+    assert parent.stdout is not None
+    runs = {}
+    for folder in folders:
+        parent.stdin.write(f"{folder}\n")
+        parent.stdin.flush()
+        runs[folder] = int(parent.stdout.readline())
+    for folder, process in runs.items():
         latest = time.monotonic() + 60
-        while time.monotonic() < latest and not all(_begun(folder) for folder in folders):
-            time.sleep(0.01)
-        for pid in lives:
-            time.sleep(rng.uniform(0.0, 0.5))
-            os.kill(pid, 9)
-        parent.wait(60)
+        while not _begun(folder) and time.monotonic() < latest:
+            time.sleep(0.005)
+        time.sleep(rng.uniform(0.0, 0.7))
+        os.kill(process, signal.SIGKILL)
 
 
 def _begun(folder: Path) -> bool:

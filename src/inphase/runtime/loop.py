@@ -213,8 +213,9 @@ class Loop:
                         stage(now)
                 except Exception as error:  # noqa: BLE001 - whatever it is, the robot has to be brought to rest
                     self.actuation.guard.failure = error
-        if command.is_due(now):
-            self._command(self.clock.now(), command.done(now))
+        sending = self.clock.now()  # what took too long before makes one command of several
+        if command.is_due(sending):
+            self._command(sending, command.done(sending))
         after = self.clock.now()
         self.timings["cycle"].add(after - now)
         self.cycles += 1
