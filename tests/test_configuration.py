@@ -432,6 +432,7 @@ def written(draw: st.DrawFn, key: str) -> str:
 
 
 CONFUSING = [
+    *("[\n[1],\n[ 'a' ],\n]", "[\n{ a = 1 },\n[\n[1]\n]]"),
     *("1", '"[a]"', "'b = 1'", '"#"', '"""\n[a]\nb = 1\n"""', "'''\n[a]\n#'''", "{ a = 1, b = { 'c' = \"}\" } }"),
     *(
         "[ # ]\n1, [2], # b = 2\n]",
@@ -512,6 +513,19 @@ def test_the_line_is_that_on_which_a_key_was_written(document, data):
     for ending in ("\n", "\r\n"):
         for path in data.draw(st.permutations(paths)):
             assert line_of(text.replace("\n", ending), path) == plainly(told, path), path
+
+
+def test_the_own_line_of_a_table_goes_before_that_of_what_is_in_it():
+    text = "[a.b]\nx = 1\n[a]\ny = 1\n[c]\nd.e = 1\n"
+    for path, line in {
+        ("a",): 3,
+        ("a", "z"): 3,
+        ("a", "b"): 1,
+        ("a", "b", "x"): 2,
+        ("c", "d"): 6,
+        ("c", "d", "f"): 6,
+    }.items():
+        assert line_of(text, path) == line, path
 
 
 def test_a_line_is_found_in_whatever_is_no_toml():
