@@ -517,3 +517,16 @@ def test_what_was_read_before_a_reset_and_comes_after_it_is_of_the_interaction_b
     assert before == sorted(before)
     assert max(before) == pytest.approx(0.38, abs=0.03)
     assert min(after) == pytest.approx(0.52)
+
+
+def test_nor_is_it_put_together_with_what_is_read_after_a_reset(model):
+    """The second sensor reads at 0.55 s, just after a reset, and the first at 0.54 s and 0.56 s."""
+    sensors, _ = two_sensors(model)
+    clocks, rates = tuple(sensor.name for sensor in sensors), Rates(sense=50.0, respond=25.0, command=200.0)
+    run = bench(model, sensors=sensors, sight=Sight(delay=0.1), rates=rates, shared_clock=clocks)
+    taken = observed_by(run)
+    run.clock.at(0.544, run.loop.reset)
+    run.run(0.8)
+    after = [(t, values) for t, values, _ in taken if t > 0.54]
+    assert after[0][0] == pytest.approx(0.56)
+    assert not np.isnan(after[0][1]).any()
