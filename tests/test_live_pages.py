@@ -110,10 +110,9 @@ def test_the_page_on_devices_runs(here, monkeypatch):
     Path("udp.toml").write_text(configuration.replace("[robot]", "[robot]\nport = " + ports["9871"]))
     names: dict[str, Any] = {"__name__": "page"}
     printed = run_python(DEVICES, names, text)
-    assert "tracker: " in printed
     (counts,) = re.findall(r"^tracker: (\d+) came in order", printed, re.MULTILINE)
     assert int(counts) > 20
-    assert "HOLDING" in printed
+    assert "2 s have passed" in printed
 
     sensor, robot = names["UdpSensor"](["x"], "a", port=free_port()), names["UdpRobot"](["y"], "b", port=free_port())
     assert (isinstance(sensor, Sensor), isinstance(robot, Robot)) == (True, True)
@@ -179,11 +178,8 @@ def test_every_entry_is_on_the_page_with_its_default():
         *("filter", "rates", "sensing", "sensors", "robot", "response", "smoothing", "safety", "recording"),
         *("outputs", "demonstrations"),
     }
-
-    for entry in said:
-        assert entry.split(".")[0] not in ("rates", "sensing", "response", "smoothing", "safety") or entry in known, (
-            entry
-        )
+    checked = {entry for entry in said if re.match(r"(rates|sensing|response|smoothing|safety)\.", entry)}
+    assert checked <= set(defaults())
 
 
 def test_every_device_is_on_the_page_with_its_entries():

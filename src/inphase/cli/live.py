@@ -19,11 +19,10 @@ from inphase.runtime.clock import SystemClock
 from inphase.runtime.configuration import Configuration, no_limits, read_configuration
 from inphase.runtime.live import prepared
 from inphase.runtime.loop import Loop
-from inphase.runtime.run_report import RunReport
+from inphase.runtime.run_report import REPORT, RunReport
 
 STOPPED_BY_TROUBLE = 1  # exit code
 REFRESHED = 0.2  # [s]
-SILENT = ("report",)  # kinds of events that are not printed
 
 
 def live(
@@ -62,7 +61,7 @@ def lead(console: Output, configuration: Configuration, duration: float | None) 
 
     def tell(event: RecordedEvent) -> None:
         begun[:] = begun or [event.time]
-        if event.kind not in SILENT:
+        if event.kind != REPORT:  # it is printed as lines
             console.print(f"{event.time - begun[0]:8.2f} s  {_sentence(event)}")
 
     with prepared(configuration, listeners=[tell]) as run:

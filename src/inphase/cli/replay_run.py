@@ -27,6 +27,7 @@ from inphase.result import Estimate
 from inphase.runtime.clock import SystemClock
 from inphase.runtime.recorder import TELLS
 from inphase.runtime.replay import identical, replay
+from inphase.runtime.run_report import REPORT
 
 DIFFERS = 1  # exit code
 EVENTS = 40  # that are printed
@@ -158,7 +159,7 @@ def _print_head(console: Console, recording: Recording, source: str) -> None:
         console.print(f"the recording is damaged: {told['damage']}", style="red")
     for loss in _losses(recording):
         console.print(f"{_since(recording, loss)}  {loss.reason}", style="red")
-    rest = [event for event in events if event.kind != TELLS]
+    rest = [event for event in events if event.kind not in (TELLS, REPORT)]
     for event in rest[:EVENTS]:
         states = f"{event.before} → {event.after}: " if event.before or event.after else ""
         console.print(f"{_since(recording, event)}  {event.kind}: {states}{event.reason}", style="dim")

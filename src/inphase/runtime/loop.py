@@ -24,7 +24,7 @@ from inphase.runtime.interrupts import interrupts
 from inphase.runtime.journal import Journal
 from inphase.runtime.perception import Perception, Sight
 from inphase.runtime.playing import Play, Player
-from inphase.runtime.run_report import RunReport
+from inphase.runtime.run_report import REPORT, RunReport
 from inphase.runtime.safety import Answer, State
 from inphase.runtime.schedule import Schedule
 from inphase.runtime.timing import Timing
@@ -229,7 +229,7 @@ class Loop:
         self._ended = self.clock.now()
         self._tell_failed(self._ended)
         self.journal.tell(self._ended, "end", self._reason)
-        self.journal.tell(self._ended, "report", self.report.as_json)
+        self.journal.tell(self._ended, REPORT, self.report.as_json)
 
     @property
     def report(self) -> RunReport:

@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass
 
 from inphase.runtime.timing import Spread
 
+REPORT = "report"  # the kind of event that holds one
+
 
 @dataclass(frozen=True)
 class RunReport:

@@ -22,7 +22,7 @@ from inphase.runtime.adapters.lsl_library import load_lsl
 from inphase.runtime.clock import Clock
 from inphase.runtime.device import Sample, Signal
 
-SECOND = 0.5  # [s] for which a second stream of the same name is waited for
+SECOND = 1.0  # [s] for which a second stream of the same name is waited for
 CHUNK = 1024  # samples that are taken at once
 BUFFER = 10  # [s] of samples that wait to be read, or hundreds of samples of a stream without a rate
 
