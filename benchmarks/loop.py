@@ -27,8 +27,9 @@ from inphase.runtime.conduct import Conduct
 from inphase.runtime.devices import ReplaySensor, SimulatedRobot
 from inphase.runtime.journal import Journal
 from inphase.runtime.limits import Limits
-from inphase.runtime.loop import Loop, Rates
+from inphase.runtime.loop import Loop
 from inphase.runtime.playing import Play
+from inphase.runtime.rates import Rates
 from inphase.runtime.recorder import Recorder
 from inphase.runtime.replay import provenance_of
 from inphase.runtime.timing import Timing

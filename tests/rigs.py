@@ -18,8 +18,9 @@ from inphase.runtime.conduct import Conduct
 from inphase.runtime.devices import SimulatedPartner, SimulatedRobot
 from inphase.runtime.journal import Journal
 from inphase.runtime.limits import Limits
-from inphase.runtime.loop import Loop, Rates
+from inphase.runtime.loop import Loop
 from inphase.runtime.playing import Play
+from inphase.runtime.rates import Rates
 from inphase.runtime.recorder import Recorder
 from inphase.runtime.replay import identical, provenance_of, replay
 from inphase.runtime.safety import State

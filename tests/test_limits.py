@@ -228,9 +228,9 @@ def test_the_approach_solves_its_equation(distance: float, acceleration: float, 
         ((1.0, -1.0, 1.0, 1.0), "expected low <= high of channel 0, got 1 and -1"),
         ((HELD, 1.0, 1.0, 1.0), "low <= high of channel 0"),
         ((INF, INF, 1.0, 1.0), "low <= high of channel 0"),
-        ((-1.0, 1.0, 0.0, 1.0), "a velocity > 0 of channel 0, got 0"),
-        ((-1.0, 1.0, HELD, 1.0), "a velocity > 0 of channel 0, got nan"),
-        ((-1.0, 1.0, 1.0, -2.0), "an? acceleration > 0 of channel 0, got -2"),
+        ((-1.0, 1.0, 0.0, 1.0), "velocity > 0 of channel 0, got 0"),
+        ((-1.0, 1.0, HELD, 1.0), "velocity > 0 of channel 0, got nan"),
+        ((-1.0, 1.0, 1.0, -2.0), "acceleration > 0 of channel 0, got -2"),
     ],
 )
 def test_what_are_no_limits_is_refused(parts: tuple[float, float, float, float], message: str) -> None:

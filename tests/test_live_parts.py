@@ -315,7 +315,7 @@ def test_of_both_signs_of_a_quaternion_the_nearer_is_meant(rng):
 @pytest.mark.parametrize(
     ("entries", "told"),
     [
-        ({"samples": 1}, "samples >= 2"),
+        ({"samples": 1}, "2 to 10000 samples, got 1"),
         ({"lookahead": 1.1}, "between 0 and 1"),
         ({"control_lag": -0.1}, "control_lag >= 0"),
         ({"lookahead": 0.1, "control_lag": 0.1}, "got both"),

@@ -358,3 +358,14 @@ def test_the_clock_of_the_system_waits_until_the_time_and_not_for_what_has_passe
     assert after >= begin + 0.01
     clock.wait_until(after - 1000.0)  # would never come back
     assert clock.now() >= after
+
+
+def test_readings_that_nobody_fetched_in_time_are_counted():
+    """Every reading is fetched once, or counted as one that never will be."""
+    together = Synchroniser({"hand": [Signal("x")]}, 0.1, shared_clock=["hand"], history=0.4)
+    together.take("hand", [Sample(np.array([float(i)]), i / 100, i / 100) for i in range(200)])
+    fetched = together.fetch(2.0)
+    assert [values[0] for _, values in fetched] == list(range(200 - len(fetched), 200))
+    assert len(fetched) + together.unfetched == 200
+    assert together.unfetched > 100
+    assert together.fetch(2.0) == []

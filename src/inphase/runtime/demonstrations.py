@@ -15,10 +15,11 @@ import numpy as np
 from inphase.channels import Channel, check_channels
 from inphase.errors import DataError, InphaseError, OptionError, listing
 from inphase.runtime.clock import Clock
+from inphase.runtime.combine import SensorRecording
 from inphase.runtime.device import Sample, Sensor, check_signals
 from inphase.runtime.episode import Episode, delete, described, joined, next_number, write_next
 from inphase.runtime.sensor_log import SensorLog
-from inphase.runtime.synchronise import SensorRecording, Synchroniser
+from inphase.runtime.synchronise import Synchroniser
 
 PRESSED = 0.5  # of the trigger, above which it is
 

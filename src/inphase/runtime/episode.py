@@ -17,7 +17,7 @@ from inphase.io.csv import write_csv
 from inphase.io.files import SUFFIXES
 from inphase.io.notes import read_notes, write_notes
 from inphase.preprocess.checks import EVERY_EPISODE, Finding, check_episode, check_episodes
-from inphase.runtime.synchronise import SensorRecording, combine_counted
+from inphase.runtime.combine import SensorRecording, combine_counted
 from inphase.runtime.track import Fate
 from inphase.trajectory import Demonstration
 

@@ -42,7 +42,7 @@ class Limits:
                 raise OptionError(f"limits: expected low <= high of channel {i}, got {low:g} and {high:g}")
             for name in ("velocity", "acceleration"):
                 if not getattr(self, name)[i] > 0:
-                    raise OptionError(f"limits: expected a {name} > 0 of channel {i}, got {getattr(self, name)[i]:g}")
+                    raise OptionError(f"limits: expected {name} > 0 of channel {i}, got {getattr(self, name)[i]:g}")
 
     def __len__(self) -> int:
         return len(self.low)

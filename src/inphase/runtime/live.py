@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -53,11 +53,10 @@ def prepared(
     outputs = _outputs(configuration, loop)
     journal.listeners.extend(output for output in outputs if callable(output))
     target, capacity = _target(configuration)
-    started = list[Output]()
-    try:
+    with ExitStack() as ends:  # in reverse: the recording is closed first, and all are, whatever one of them says
         for output in outputs:
             output.start()
-            started.append(output)
+            ends.callback(output.stop)
         if target is not None:
             model = configuration.needed_model()
             journal.recorder = Recorder(
@@ -68,12 +67,8 @@ def prepared(
                 name=target.stem,
                 capacity=capacity,
             )
+            ends.callback(journal.recorder.close)
         yield Run(loop, target)
-    finally:
-        if journal.recorder is not None:
-            journal.recorder.close()
-        for output in started:
-            output.stop()
 
 
 def _outputs(configuration: Configuration, loop: Loop) -> list[Any]:

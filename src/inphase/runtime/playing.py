@@ -15,6 +15,8 @@ from inphase.result import Estimate, Response, Status
 from inphase.runtime.smoothing import wanted_at
 from inphase.session import Session
 
+MOST_SAMPLES = 10_000  # of a response: more is a mistake
+
 
 @dataclass(frozen=True)
 class Play:
@@ -34,8 +36,8 @@ class Play:
     horizon: float | None = None
 
     def __post_init__(self) -> None:
-        if not self.samples >= 2:
-            raise OptionError(f"response: expected samples >= 2, got {self.samples}")
+        if not 2 <= self.samples <= MOST_SAMPLES:
+            raise OptionError(f"response: expected 2 to {MOST_SAMPLES} samples, got {self.samples}")
         if not 0 <= self.lookahead <= 1:
             raise OptionError(f"response: expected a lookahead of phase between 0 and 1, got {self.lookahead}")
         if not 0 <= self.control_lag < inf:

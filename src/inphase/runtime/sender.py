@@ -15,6 +15,7 @@ from inphase.runtime.device import Command, Robot
 from inphase.runtime.limits import Limits
 from inphase.runtime.smoothing import AlphaBeta, Motion
 
+MOST_POINTS = 1000  # of a trajectory that is sent with every command
 LONGEST_BRAKING = 2000  # points of a trajectory; a robot that takes longer to stand is braked by the next command
 
 Course = Callable[[Float[np.ndarray, " S"], Float[np.ndarray, " D"]], Float[np.ndarray, "S D"]]
@@ -47,7 +48,10 @@ class Sender:
             )
         self._robot, self._limits, self._smoothing = robot, limits, smoothing
         self._period, self._silence = period, silence
-        self._points = 0 if horizon is None else max(ceil(horizon / period), 1)
+        self._points = 0 if horizon is None else max(ceil(min(horizon / period, MOST_POINTS + 1)), 1)
+        if self._points > MOST_POINTS:
+            longest = MOST_POINTS * period
+            raise OptionError(f"response: expected a horizon of at most {longest:g} s at this rate, got {horizon:g}")
         self._hold = np.full(len(limits), np.nan)
         self._lock = threading.RLock()  # the watchdog brakes from a thread of its own
         self.begin(np.zeros(len(limits)), 0.0)

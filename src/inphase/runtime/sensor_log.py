@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from inphase.errors import ObservationError
+from inphase.runtime.combine import SensorRecording
 from inphase.runtime.device import Sample, Sensor
-from inphase.runtime.synchronise import SensorRecording
 
 
 class SensorLog:

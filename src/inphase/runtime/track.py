@@ -72,6 +72,7 @@ class Track:
         self._stamps: list[float] = []
         self._rows: list[FloatArray] = []
         self._fresh: list[tuple[float, BoolArray]] = []  # by stamp, which readings nobody has fetched
+        self.unfetched = 0  # and how many never will be: they are older than all that is kept
         self._seen = np.full(len(signals), -inf)
         self._odd_since: float | None = None
 
@@ -186,7 +187,9 @@ class Track:
         gone = bisect_left(self._stamps, self._stamps[-1] - self._kept)
         del self._stamps[:gone], self._rows[:gone]
         if gone:
-            self._fresh = [entry for entry in self._fresh if entry[0] >= self._stamps[0]]
+            kept = [entry for entry in self._fresh if entry[0] >= self._stamps[0]]
+            self.unfetched += len(self._fresh) - len(kept)
+            self._fresh = kept
         return Fate.TAKEN if last else Fate.REORDERED
 
     def _nearest(self, places: Iterable[int], stamp: float) -> tuple[FloatArray, FloatArray]:

@@ -22,9 +22,9 @@ from inphase.runtime.adapters.bag_listing import BagListing, BagTopic, list_bag
 from inphase.runtime.adapters.bag_messages import Bag
 from inphase.runtime.adapters.message_fields import Field, fields_of, stamp_of
 from inphase.runtime.adapters.topic_map import TopicMap, read_topic_map
+from inphase.runtime.combine import SensorRecording, combine
 from inphase.runtime.device import Signal
 from inphase.runtime.devices.replay_sensor import ReplaySensor
-from inphase.runtime.synchronise import SensorRecording, combine
 from inphase.trajectory import Dataset, Demonstration
 
 __all__ = [

@@ -20,9 +20,10 @@ from inphase.runtime.configuration.robot_conduct import GUARDING, read_conduct, 
 from inphase.runtime.configuration.section import Section
 from inphase.runtime.device import Robot, Sensor, check_signals
 from inphase.runtime.journal import Journal
-from inphase.runtime.loop import Loop, Rates
+from inphase.runtime.loop import Loop
 from inphase.runtime.perception import Perception, Sight, check_names
 from inphase.runtime.playing import Play
+from inphase.runtime.rates import Rates
 from inphase.runtime.replay import provenance_of
 from inphase.runtime.smoothing import AlphaBeta
 from inphase.runtime.synchronise import by_channel
