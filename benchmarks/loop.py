@@ -36,7 +36,8 @@ from inphase.runtime.timing import Timing
 from inphase.trajectory import Demonstration
 
 SENSE, COMMAND, RESPOND = 500.0, 100.0, 25.0  # [1/s]
-SIZE = Size(30, 15, 108)  # of the handshake (2.5.3)
+CHANNELS, BASIS = 30, 15  # of the handshake (2.5.3)
+FEW, MANY = 24, 108  # demonstrations: what is usual, and those of the handshake
 PATIENT = DURATION + 0.05  # [s] from one interaction to the next
 SHARE = 0.2  # of its period, that a cycle may take: the wish of the issue
 
@@ -60,10 +61,12 @@ def memory() -> float:
     return pages * 4096 / 1e6
 
 
-def measure(filter: str, observe: float | None, seconds: float, folder: Path, record: bool) -> dict[str, object]:
+def measure(
+    filter: str, observe: float | None, demonstrations: int, seconds: float, folder: Path, record: bool
+) -> dict[str, object]:
     """The figures of one run."""
     rng = np.random.default_rng(0)
-    model = make_model(SIZE, rng)
+    model = make_model(Size(CHANNELS, BASIS, demonstrations), rng)
     times, values = readings(model, seconds, rng)
     channels: tuple[Channel, ...] = model.channels[: len(model.observed)]
     sensor = ReplaySensor(Demonstration(times, values, "partner"), channels, name="partner")
@@ -108,6 +111,7 @@ def measure(filter: str, observe: float | None, seconds: float, folder: Path, re
     return {
         "filter": filter,
         "observe": observe or SENSE,
+        "demonstrations": demonstrations,
         "seconds": seconds,
         "recorded": record,
         "samples": taken,
@@ -127,7 +131,8 @@ def measure(filter: str, observe: float | None, seconds: float, folder: Path, re
 def show(found: dict[str, object]) -> None:
     """One run, for a person."""
     print(
-        f"\n{found['filter']}, {found['observe']:g} observations a second, {found['seconds']:g} s"
+        f"\n{found['filter']}, {found['demonstrations']} demonstrations, {found['observe']:g} observations a second, "
+        f"{found['seconds']:g} s"
         f"{'' if found['recorded'] else ', not recorded'}: {found['samples']} samples, {found['lost_samples']} lost; "
         f"{found['commands']} commands, {found['missed']} missed; {found['unrecorded']} not recorded; "
         f"memory {found['memory'][0]:.0f} → {found['memory'][1]:.0f} MB"
@@ -148,17 +153,18 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=600.0, help="of the first row; the others have a tenth")
     parser.add_argument("--filter", default="", help="one filter alone, at --observe")
     parser.add_argument("--observe", type=float, default=None, help="[1/s]; every reading by itself unless told")
+    parser.add_argument("--demonstrations", type=int, default=FEW, help="that the model of --filter was learned from")
     parser.add_argument("--unrecorded", action="store_true")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
-    rows = [("ebip", COMMAND, 1.0), ("bip", COMMAND, 0.1), ("ebip", None, 0.1), ("rbpf", 25.0, 0.1)]
+    rows = [("bip", COMMAND, FEW, 1.0), ("bip", None, FEW, 0.1), ("ebip", COMMAND, MANY, 0.1), ("rbpf", 25.0, FEW, 0.1)]
     if options.filter:
-        rows = [(options.filter, options.observe, 1.0)]
+        rows = [(options.filter, options.observe, options.demonstrations, 1.0)]
     with tempfile.TemporaryDirectory() as folder:
-        for number, (filter, observe, share) in enumerate(rows):
+        for number, (filter, observe, demonstrations, share) in enumerate(rows):
             target = Path(folder) / str(number)
             target.mkdir()
-            found = measure(filter, observe, share * options.seconds, target, not options.unrecorded)
+            found = measure(filter, observe, demonstrations, share * options.seconds, target, not options.unrecorded)
             if options.json:
                 json.dump(found, sys.stdout)
                 print()

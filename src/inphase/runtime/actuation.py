@@ -110,6 +110,7 @@ class Actuation:
         now = self._clock.now()
         if not self.sender.at_rest(now):
             self._send(now, None)
+            self._journal.flush()
 
     def stop(self) -> None:
         """Bring the robot to rest, and let go of it."""

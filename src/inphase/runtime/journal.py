@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from inphase.arrays import FloatArray
 from inphase.recording import RecordedCommand, RecordedEvent
@@ -18,6 +19,8 @@ REMEMBERED = 1000  # events
 class Journal:
     """Takes down a run; nothing in it waits, and what goes wrong with a recorder or a listener is an event itself.
 
+    What a cycle leaves is given to the recorder by `flush`, when the cycle is over: its thread would run in between.
+
     listeners: called with every event, on the loop's thread: they must not wait.
     """
 
@@ -25,6 +28,7 @@ class Journal:
         self.events: deque[RecordedEvent] = deque(maxlen=REMEMBERED)
         self.recorder, self.listeners = recorder, list(listeners)
         self._known: set[tuple[str, str]] = set()
+        self._waiting: deque[Callable[[], object]] = deque()
 
     @property
     def lost(self) -> int:
@@ -39,24 +43,35 @@ class Journal:
     def step(self, values: FloatArray, estimate: Estimate) -> None:
         """A sample and what the session made of it."""
         if self.recorder is not None:
-            self.recorder.put_step(values, estimate)
+            self._waiting.append(partial(self.recorder.put_step, values, estimate))
 
     def response(self, time: float, response: Response) -> None:
         """A response made at that time [s]."""
         if self.recorder is not None:
-            self.recorder.put_response(time, response)
+            self._waiting.append(partial(self.recorder.put_response, time, response))
 
     def command(self, time: float, command: Command, signals: tuple[str, ...]) -> None:
         """What a robot with these signals was sent at that time [s]."""
         if self.recorder is not None:
-            self.recorder.put_command(RecordedCommand(time, command.times, command.positions, signals))
+            recorded = RecordedCommand(time, command.times, command.positions, signals)
+            self._waiting.append(partial(self.recorder.put_command, recorded))
+
+    def flush(self) -> None:
+        """Give the recorder what waits for it."""
+        while self._waiting:
+            try:
+                put = self._waiting.popleft()
+            except IndexError:  # another thread was quicker
+                return
+            put()
 
     def tell(self, time: float, kind: str, reason: str, before: str = "", after: str = "") -> None:
         """An event at that time [s]."""
         event = RecordedEvent(time, kind, reason, before, after)
         self.events.append(event)
         if self.recorder is not None:
-            self.recorder.put_event(event)
+            self._waiting.append(partial(self.recorder.put_event, event))
+            self.flush()
         failed = []
         for listener in tuple(self.listeners):
             try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import signal
+import sys
 from collections import deque
 from collections.abc import Callable, Sequence
 
@@ -21,6 +22,8 @@ from inphase.runtime.run_report import REPORT, RunReport
 from inphase.runtime.safety import Answer, State
 from inphase.runtime.stages import Stages
 from inphase.session import Session
+
+TURN = 0.0002  # [s] for which another thread of Python may keep the loop waiting; it is 5 ms otherwise
 
 
 class Loop:
@@ -65,6 +68,7 @@ class Loop:
         self._begun = self._ended = 0.0
         self._ending = ""  # why it ends
         self._final: RunReport | None = None
+        self._switching = sys.getswitchinterval()
         self._asked: deque[Callable[[], None]] = deque()  # by other threads, for the next cycle
 
     def __repr__(self) -> str:
@@ -137,6 +141,8 @@ class Loop:
         """Start all devices; raises OptionError where the robot does not answer."""
         gc.collect()
         gc.freeze()  # what is there stays, and the collector need not look at it again
+        self._switching = sys.getswitchinterval()
+        sys.setswitchinterval(TURN)
         try:
             self.actuation.start()
             try:
@@ -145,7 +151,7 @@ class Loop:
                 self.actuation.stop()
                 raise
         except BaseException:
-            gc.unfreeze()
+            self._unfreeze()
             raise
         self._begun = now = self.clock.now()
         self.stages.begin(now)
@@ -169,6 +175,7 @@ class Loop:
         while self._asked:
             self._asked.popleft()()
         self.stages.cycle(bool(self._ending))
+        self.journal.flush()
         if self.stages.over:
             self.finish("the interaction is over")
 
@@ -176,12 +183,16 @@ class Loop:
         """Bring the robot to rest, and stop all devices."""
         self.actuation.stop()
         self.perception.stop()
-        gc.unfreeze()
+        self._unfreeze()
         self._ended = self.clock.now()
         self.stages.tell_failed(self._ended)
         self.journal.tell(self._ended, "end", self._reason)
         self._final = self.report
         self.journal.tell(self._ended, REPORT, self._final.as_json)
+
+    def _unfreeze(self) -> None:
+        gc.unfreeze()
+        sys.setswitchinterval(self._switching)
 
     @property
     def report(self) -> RunReport:

@@ -13,7 +13,7 @@ from inphase.arrays import FloatArray
 from inphase.channels import match
 from inphase.errors import OptionError
 from inphase.result import Estimate
-from inphase.runtime.averaging import averaged
+from inphase.runtime.averaging import Averaging
 from inphase.runtime.clock import Clock
 from inphase.runtime.device import Sensor, check_signals
 from inphase.runtime.synchronise import Synchroniser, by_channel
@@ -68,7 +68,7 @@ class Perception:
         self.failed: dict[str, str] = {}
         self.skipped = self.late = 0
         self._delay, self._within, self._merge = sight.delay, within, merge
-        self._observed = observed
+        self._averaging = Averaging(observed)
         offered = {sensor.name: sensor.signals for sensor in sensors}
         names = [signal.name for signals in offered.values() for signal in signals]
         times = dict.fromkeys(names, STALENESS) | by_channel(sight.staleness, names)
@@ -122,7 +122,7 @@ class Perception:
         seen = [(time, values[self._order]) for time, values in readings if time > self._since]
         seen = [(time, values) for time, values in seen if not np.isnan(values).all()]
         if self._merge and len(seen) > 1:
-            seen = [averaged(seen, self._observed)]
+            seen = [self._averaging(seen)]
         elif len(seen) > CATCH_UP:
             self.skipped += len(seen) - CATCH_UP
             seen = seen[-CATCH_UP:]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -62,6 +63,10 @@ class Synchroniser:
             for name, signals in sensors.items()
         }
 
+        ends = np.cumsum([0] + [len(track) for track in self._tracks.values()]).tolist()
+        spans = [slice(begin, end) for begin, end in pairwise(ends)]
+        self._columns = tuple(zip(self._tracks.values(), spans, strict=True))
+
     def take(self, sensor: str, samples: Iterable[Sample]) -> None:
         """Take in what a sensor read; raises ObservationError for an unknown sensor or a wrong number of values."""
         track = self._tracks.get(sensor)
@@ -84,10 +89,9 @@ class Synchroniser:
         Readings of several channels no further apart than `within` [s] are one, at the time of the newest, as long as
         no channel is in it twice: nothing is lost, and no more is told than the fastest sensor reads.
         """
-        ends = np.cumsum([0] + [len(track) for track in self._tracks.values()])
         fetched = [
-            _Reading(time, stamp, seen, track, slice(begin, end))
-            for track, begin, end in zip(self._tracks.values(), ends[:-1], ends[1:], strict=True)
+            _Reading(time, stamp, seen, track, columns)
+            for track, columns in self._columns
             for time, stamp, seen in track.fetch(until)
         ]
         rounds: list[list[_Reading]] = []
@@ -98,12 +102,18 @@ class Synchroniser:
                 rounds.append([reading])
             else:
                 last.append(reading)
-        return [(read[-1].time, frozen(self._read(read))) for read in rounds]
+        return [(read[-1].time, self._read(read)) for read in rounds]
 
     def _read(self, readings: Sequence[_Reading]) -> Float[np.ndarray, " D"]:
-        values, time = np.full(len(self.names), np.nan), readings[-1].time
-        for r in readings:
-            values[r.columns] = np.where(r.seen, r.track.since(r.stamp, time), values[r.columns])
+        time = readings[-1].time
+        if len(readings) == 1 and len(self._columns) == 1:
+            values = readings[0].track.since(readings[0].stamp, time)
+            values[~readings[0].seen] = np.nan
+        else:
+            values = np.full(len(self.names), np.nan)
+            for r in readings:
+                values[r.columns] = np.where(r.seen, r.track.since(r.stamp, time), values[r.columns])
+        values.setflags(write=False)
         return values
 
     @property
