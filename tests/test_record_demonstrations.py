@@ -402,6 +402,8 @@ class Child:
             stderr=subprocess.STDOUT,
             env=environment,
             text=True,
+            # A group of its own beside its parent's: one that no shell of the session looks after cannot be suspended.
+            preexec_fn=os.setpgrp,
         )
         self.text = ""
         self._thread = threading.Thread(target=self._read, daemon=True)
@@ -470,8 +472,11 @@ def test_a_process_at_a_terminal_is_suspended_and_goes_on(tmp_path, terminal):
         running.wait_for("the next is 001.csv")
         assert not termios.tcgetattr(slave)[3] & termios.ICANON
         running.process.send_signal(signal.SIGTSTP)
-        _, status = os.waitpid(running.process.pid, os.WUNTRACED)
-        assert os.WIFSTOPPED(status)
+        end, status = time.monotonic() + 20, 0
+        while not os.WIFSTOPPED(status):
+            assert time.monotonic() < end
+            _, status = os.waitpid(running.process.pid, os.WUNTRACED | os.WNOHANG)
+            time.sleep(0.01)
         assert termios.tcgetattr(slave) == before  # a shell finds it as it was
         running.process.send_signal(signal.SIGCONT)
         end = time.monotonic() + 20
