@@ -28,7 +28,7 @@ from rich.status import Status
 import inphase
 from inphase.basis import FAMILIES, Gaussian, Periodic, Polynomial, Sigmoid
 from inphase.channels import Kind
-from inphase.cli import console, main
+from inphase.cli import console
 from inphase.cli.basis_text import parse_basis, show_basis
 from inphase.cli.card import describe_model, print_model
 from inphase.cli.evidence import print_evidence
@@ -85,21 +85,6 @@ def here(template: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pat
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("COLUMNS", raising=False)
     return tmp_path
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
-    """Run a command in this process: exit code, output, errors."""
-
-    def command(*arguments: object) -> tuple[int, str, str]:
-        try:
-            code = main([str(argument) for argument in arguments])
-        except SystemExit as end:
-            code = int(end.code or 0)
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return command
 
 
 def tree(folder: Path) -> dict[str, bytes | None]:

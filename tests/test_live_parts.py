@@ -26,6 +26,7 @@ from inphase.runtime.journal import Journal
 from inphase.runtime.lag import lag_of
 from inphase.runtime.limits import Limits
 from inphase.runtime.playing import Play, Player
+from inphase.runtime.recorder import Recorder
 from inphase.runtime.safety import Answer, Policy
 from inphase.runtime.schedule import Schedule
 from inphase.runtime.sender import Sender
@@ -358,6 +359,38 @@ def test_what_lasts_is_told_once():
         journal.tell_once(1.0, "recorder", reason)
     assert [event.reason for event in journal.events] == ["full", "broken"]
     assert (journal.lost, journal.failure) == (0, None)
+
+
+class Told(Recorder):
+    """A recorder that remembers what it was given, in that order."""
+
+    def __init__(self, *given, **options):
+        super().__init__(*given, **options)
+        self.given = []
+
+    def put_step(self, values, estimate):
+        self.given.append(("step", estimate.time))
+        return super().put_step(values, estimate)
+
+    def put_event(self, event):
+        self.given.append(("event", event.time))
+        return super().put_event(event)
+
+
+def test_an_event_is_recorded_at_once_and_after_all_that_came_before_it(tmp_path):
+    """What a cycle leaves waits for its end; of a program that dies, what it did about it is in the file."""
+    channels = make_channels(["x"], ["y"])
+    with Told(tmp_path / "a.mcap", channels) as recorder:
+        journal = Journal(recorder)
+        estimate = Estimate(1.0, 0.1, 0.1, 0.5, 0.1, 0.0, Status.FOLLOWING)
+        journal.step(np.zeros(1), estimate)
+        assert recorder.given == []
+        journal.tell(2.0, "safety", "for a reason")
+        assert recorder.given == [("step", 1.0), ("event", 2.0)]
+        journal.step(np.zeros(1), Estimate(3.0, 0.1, 0.1, 0.5, 0.1, 0.0, Status.FOLLOWING))
+        journal.flush()
+        journal.flush()
+        assert recorder.given == [("step", 1.0), ("event", 2.0), ("step", 3.0)]
 
 
 # ------------------------------------------------------------------------------------------------------------ conduct

@@ -14,7 +14,6 @@ from interactions import CONTROLLED, OBSERVED, chance_model, phase_model
 import inphase
 from inphase import Estimate, Status
 from inphase.channels import make_channels
-from inphase.cli import main
 from inphase.recording import RecordedEvent
 from inphase.runtime import FakeClock
 from inphase.runtime.recorder import Recorder
@@ -22,19 +21,6 @@ from inphase.runtime.replay import identical, provenance_of
 
 MODEL = chance_model(np.random.default_rng(3), phase_model())
 STEP, COUNT = 0.03, 30
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
-    def command(*arguments: object) -> tuple[int, str, str]:
-        try:
-            code = main([str(argument) for argument in arguments])
-        except SystemExit as end:
-            code = int(end.code or 0)
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return command
 
 
 def unchanged(index: int, estimate: Estimate) -> Estimate:
