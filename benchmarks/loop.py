@@ -22,6 +22,7 @@ from sizes import DURATION, Size, make_model
 
 from inphase.channels import Channel
 from inphase.model import Model
+from inphase.replay import provenance_of
 from inphase.runtime import Signal, SystemClock
 from inphase.runtime.conduct import Conduct
 from inphase.runtime.devices import ReplaySensor, SimulatedRobot
@@ -31,7 +32,6 @@ from inphase.runtime.loop import Loop
 from inphase.runtime.playing import Play
 from inphase.runtime.rates import Rates
 from inphase.runtime.recorder import Recorder
-from inphase.runtime.replay import provenance_of
 from inphase.runtime.timing import Timing
 from inphase.trajectory import Demonstration
 

@@ -13,6 +13,7 @@ from interactions import CONTROLLED, dataset, taught
 import inphase
 from inphase.io import read_recording
 from inphase.recording import Recording
+from inphase.replay import identical, provenance_of, replay
 from inphase.runtime import Command, FakeClock, Sample, Sensor, Signal
 from inphase.runtime.conduct import Conduct
 from inphase.runtime.devices import SimulatedPartner, SimulatedRobot
@@ -22,7 +23,6 @@ from inphase.runtime.loop import Loop
 from inphase.runtime.playing import Play
 from inphase.runtime.rates import Rates
 from inphase.runtime.recorder import Recorder
-from inphase.runtime.replay import identical, provenance_of, replay
 from inphase.runtime.safety import State
 
 JOINTS = tuple(Signal(name) for name in CONTROLLED)

@@ -15,7 +15,7 @@ from interactions import dataset, shapes_unchecked, taught
 
 import inphase
 from inphase.io import read_recorded_model, read_recording
-from inphase.runtime.replay import identical, replay
+from inphase.replay import identical, replay
 
 KILLS = 20
 AT_ONCE = 5

@@ -18,13 +18,13 @@ from rigs import HOME, JOINTS, Bench, Listed, bench, learned, violations
 import inphase
 from inphase.channels import make_channels
 from inphase.errors import OptionError
+from inphase.replay import identical
 from inphase.runtime import FakeClock, Signal
 from inphase.runtime.devices import Dead, Late, ReplaySensor, SimulatedPartner, SimulatedRobot
 from inphase.runtime.limits import Limits
 from inphase.runtime.loop import Rates
 from inphase.runtime.perception import Sight
 from inphase.runtime.playing import Play
-from inphase.runtime.replay import identical
 from inphase.runtime.safety import Answer, Policy, State
 from inphase.runtime.smoothing import AlphaBeta
 

@@ -31,8 +31,8 @@ from inphase.channels import make_channels
 from inphase.io import mcap_messages, read_recorded_model, read_recording
 from inphase.io.model_file import checksum_named, model_bytes, model_hash
 from inphase.recording import RecordedCommand, RecordedEvent
+from inphase.replay import provenance_of, replay
 from inphase.runtime.recorder import FLUSH_EVERY, Recorder
-from inphase.runtime.replay import provenance_of, replay
 
 CHANNELS = make_channels(OBSERVED, CONTROLLED, units={"reach": "m"})
 MODEL = chance_model(np.random.default_rng(3), phase_model())
@@ -387,7 +387,7 @@ import sys, time
 import numpy as np
 from inphase import Estimate, Model, Status
 from inphase.runtime.recorder import Recorder
-from inphase.runtime.replay import provenance_of
+from inphase.replay import provenance_of
 
 model = Model.load(sys.argv[2])
 recorder = Recorder(sys.argv[1], model.channels, {**provenance_of(model), "bag": "killed"}, model=model)

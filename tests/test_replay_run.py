@@ -15,9 +15,9 @@ import inphase
 from inphase import Estimate, Status
 from inphase.channels import make_channels
 from inphase.recording import RecordedEvent
+from inphase.replay import identical, provenance_of
 from inphase.runtime import FakeClock
 from inphase.runtime.recorder import Recorder
-from inphase.runtime.replay import identical, provenance_of
 
 MODEL = chance_model(np.random.default_rng(3), phase_model())
 STEP, COUNT = 0.03, 30

@@ -23,10 +23,10 @@ from inphase.errors import DataError, OptionError
 from inphase.io import read_recorded_model, read_recording
 from inphase.model import Model
 from inphase.recording import RecordedEvent, Recording
+from inphase.replay import identical, replay
 from inphase.result import Estimate
 from inphase.runtime.clock import SystemClock
 from inphase.runtime.recorder import TELLS
-from inphase.runtime.replay import identical, replay
 from inphase.runtime.run_report import REPORT
 
 DIFFERS = 1  # exit code

@@ -3,6 +3,7 @@
 Devices to try out and to copy are in `inphase.runtime.devices`, those of others in `inphase.runtime.adapters`.
 """
 
+from inphase.replay import provenance_of, replay, session_of
 from inphase.runtime.clock import Clock, FakeClock, SystemClock
 from inphase.runtime.combine import SensorRecording, combine
 from inphase.runtime.conduct import Conduct
@@ -17,7 +18,6 @@ from inphase.runtime.perception import Sight
 from inphase.runtime.playing import Play
 from inphase.runtime.rates import Rates
 from inphase.runtime.recorder import Recorder
-from inphase.runtime.replay import provenance_of, replay, session_of
 from inphase.runtime.run_report import RunReport
 from inphase.runtime.safety import Answer, Policy, State, Trouble
 from inphase.runtime.smoothing import AlphaBeta

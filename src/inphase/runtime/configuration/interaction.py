@@ -13,6 +13,7 @@ from inphase.errors import InphaseError, listing
 from inphase.filters import FILTERS, RECOMMENDED
 from inphase.io.toml import read_toml
 from inphase.model import Model
+from inphase.replay import provenance_of
 from inphase.runtime.clock import Clock
 from inphase.runtime.conduct import Conduct
 from inphase.runtime.configuration.devices import ROBOTS, SENSORS, Maker, make_device
@@ -24,7 +25,6 @@ from inphase.runtime.loop import Loop
 from inphase.runtime.perception import Perception, Sight, check_names
 from inphase.runtime.playing import Play
 from inphase.runtime.rates import Rates
-from inphase.runtime.replay import provenance_of
 from inphase.runtime.smoothing import AlphaBeta
 from inphase.runtime.synchronise import by_channel
 from inphase.session import Session

@@ -71,11 +71,16 @@ def replay(recording: Recording, model: Model) -> Iterator[Estimate]:
 
     A new interaction begins with the first sample after the time of an event of the kind "reset".
     """
-    session = session_of(recording, model)
+    for _, estimate in steps(recording, session_of(recording, model)):
+        yield estimate
+
+
+def steps(recording: Recording, session: Session) -> Iterator[tuple[Session, Estimate]]:
+    """The session after every sample, which can be asked for what it believes then, and its estimate."""
     names = [channel.name for channel in recording.channels]
     resets = deque(sorted(event.time for event in recording.events if event.kind == RESET and isfinite(event.time)))
     for time, values in zip(recording.times, recording.values, strict=True):
         while resets and resets[0] < time:
             resets.popleft()
             session.reset()
-        yield session.observe(float(time), dict(zip(names, values.tolist(), strict=True)))
+        yield session, session.observe(float(time), dict(zip(names, values.tolist(), strict=True)))
