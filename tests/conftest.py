@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,6 +16,10 @@ from jaxtyping import install_import_hook
 install_import_hook(["inphase", "intprim"], "beartype.beartype")
 
 os.environ.setdefault("MPLBACKEND", "Agg")  # pictures go to files, here and in the programs that tests start
+
+# A shell's background job ignores Ctrl-C, and hands that down: the programs that tests start and interrupt must not.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 hypothesis.settings.register_profile("ci", derandomize=True, deadline=None, print_blob=True)
 hypothesis.settings.register_profile("dev", deadline=None)
