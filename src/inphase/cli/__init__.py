@@ -43,6 +43,7 @@ def _run(arguments: Sequence[str]) -> int:
     from inphase.cli.record import record
     from inphase.cli.replay import replay
     from inphase.cli.replay_run import is_of_run, replay_run
+    from inphase.cli.report import report
     from inphase.cli.select import select
     from inphase.cli.validate import validate
 
@@ -54,6 +55,7 @@ def _run(arguments: Sequence[str]) -> int:
         "replay": replay_run if arguments[:1] == ["replay"] and is_of_run(arguments[1:]) else replay,
         "evaluate": evaluate,
         "select": select,
+        "report": report,
         "bags": bags,
         "record": record,
         "live": live,

@@ -15,6 +15,7 @@ from inphase.model import Model
 from inphase.recording import Recording
 from inphase.replay import identical, provenance_of, session_of, steps
 from inphase.report.glimpse import Glimpse, Lens
+from inphase.report.steady import beside
 from inphase.result import Estimate, Response
 from inphase.session import Session
 from inphase.trajectory import Demonstration
@@ -103,7 +104,8 @@ def of_demonstration(
     provenance = provenance_of(model, filter, seed, options)
     recording = Recording(demonstration.name, model.channels, demonstration.times, given, (), (), provenance)
     account = _played(recording, model, title or demonstration.name, told)
-    return replace(account, truth=demonstration.values[:, count:], progress=demonstration.phases)
+    truth = beside(model.channels[count:], demonstration.values[:, count:], account.now)
+    return replace(account, truth=truth, progress=demonstration.phases)
 
 
 def of_recording(
@@ -163,7 +165,8 @@ def _as_recorded(recording: Recording, model: Model | None, title: str, remark: 
 def _account(
     recording: Recording, model: Model | None, title: str, frames: tuple[Frame, ...], lens: Lens | None
 ) -> Account:
-    names = tuple(channel.name for channel in recording.channels if channel.role is Role.CONTROLLED)
+    controlled = [channel for channel in recording.channels if channel.role is Role.CONTROLLED]
+    names = tuple(channel.name for channel in controlled)
     steps = len(recording.estimates)
     now_times = np.array([estimate.time for estimate in recording.estimates])
     now, now_std = np.full((steps, len(names)), np.nan), np.full((steps, len(names)), np.nan)
@@ -174,7 +177,8 @@ def _account(
         own = [k for k, name in enumerate(response.channels) if name in columns]
         at = [columns[response.channels[k]] for k in own]
         now_times[i], now[i, at], now_std[i, at] = response.times[0], response.mean[0, own], response.std[0, own]
-    return Account(title, recording, model, names, now_times, now, now_std, _read(recording, names), frames, lens=lens)
+    truth = beside(controlled, _read(recording, names), now)
+    return Account(title, recording, model, names, now_times, now, now_std, truth, frames, lens=lens)
 
 
 def _read(recording: Recording, names: tuple[str, ...]) -> Float[np.ndarray, "T Dc"]:

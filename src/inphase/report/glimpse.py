@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from inphase.arrays import freeze
 from inphase.filters import Belief
@@ -18,6 +18,7 @@ VARIANCE = 0.99  # of the prior, that is enough
 POINTS = 80  # of a cloud
 PHASES = 80  # and tempos, at which densities are told
 FASTEST = 3.0  # times the typical tempo, where the densities of tempos end
+STILL = 1e-20  # of the largest variance: a feature that is certain correlates with nothing
 NARROWEST = 0.6  # of the distance between two of these phases: a kernel less wide could fall between them
 
 
@@ -95,6 +96,17 @@ class Lens:
             _density(tempo, tempo_var, seen.weights, self.tempos),
             seen.coordinate_moments[1],
         )
+
+    def correlations(
+        self, covs: Float[np.ndarray, "P R R"], phases: Float[np.ndarray, " P"], features: Int[np.ndarray, " M"]
+    ) -> Float[np.ndarray, "P M M"]:
+        """How features h(φ, w) hang together at phases (P,), where the coordinates of w have covariances (P, R, R)."""
+        rows = self.model.layout.project_each(self.model.phase.confine(phases), self.directions, features)
+        cov = rows.swapaxes(1, 2) @ covs @ rows
+        var = np.einsum("pmm->pm", cov)
+        moving = var > STILL * var.max(1, keepdims=True, initial=0.0)
+        scale = np.where(moving, 1 / np.sqrt(np.where(moving, var, 1.0)), 0.0)
+        return np.asarray(np.clip(cov * scale[:, :, None] * scale[:, None, :], -1.0, 1.0))
 
 
 def _drawn(seen: Cloud) -> Float[np.ndarray, "N 2"]:
