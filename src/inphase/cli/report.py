@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -22,6 +23,7 @@ from inphase.report.page.figures import RUNS
 from inphase.trajectory import Demonstration
 
 MODEL, RUN = ".inphase", ".mcap"
+UNASKED = "what was believed was not computed again (--quick)"
 Filters = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME...", help_behavior_hint=f"(default: {RECOMMENDED})")]
 Optional = tyro.conf.arg(help_behavior_hint="")
 
@@ -89,7 +91,8 @@ def _recorded(runs: Sequence[Path], named: Path | None, quick: bool) -> list[Acc
         recording = read_recording(run)
         model = given or (None if quick else read_recorded_model(run))
         with working(title) as told:
-            accounts.append(of_recording(recording, model, title=title, told=told))
+            account = of_recording(recording, model, title=title, told=told)
+        accounts.append(replace(account, remarks=(UNASKED,)) if quick and given is None else account)
     return accounts
 
 

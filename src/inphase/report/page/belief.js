@@ -143,8 +143,3 @@ function tint(field, value) {
   field.className = value < 0 ? "negative" : "positive";
   field.textContent = value.toFixed(1).replace("-0.0", "0.0").replace("-", "−");
 }
-
-function in_view(section) {
-  const {top, bottom} = section.getBoundingClientRect();
-  return bottom > -200 && top < window.innerHeight + 200;
-}

@@ -5,8 +5,8 @@ const RUN_COLOURS = {
   night: ["#4fb3de", "#f08a66", "#7cc797", "#ab9be6", "#e0b64c", "#e08a97"],
 };
 const ROLES = {
-  day: {ink: "#22272e", now: "#0b6e99", past: "#c65f45", sent: "#a86f10", seen: "#9aa3ad", pause: "#e9c46a", trouble: "#d1603d"},
-  night: {ink: "#e8eaed", now: "#4fb3de", past: "#f08a66", sent: "#e0b64c", seen: "#6b7580", pause: "#8a6d1c", trouble: "#a04a33"},
+  day: {ink: "#22272e", now: "#0b6e99", past: "#c65f45", sent: "#a86f10", pause: "#e9c46a", trouble: "#d1603d"},
+  night: {ink: "#e8eaed", now: "#4fb3de", past: "#f08a66", sent: "#e0b64c", pause: "#8a6d1c", trouble: "#a04a33"},
 };
 const FRAME = {day: {text: "#3d444d", line: "#8b949e", grid: "#e6e9ed"}, night: {text: "#c9d1d9", line: "#6b7580", grid: "#2f363d"}};
 
@@ -23,16 +23,11 @@ function paint(figures, mode) {
       axis_line_color: line, major_tick_line_color: line, minor_tick_line_color: null,
       major_label_text_color: text, axis_label_text_color: text,
     });
-    for (const model of figure.center) {
-      if ("grid_line_color" in model) model.grid_line_color = grid;
-      else if ("line_color" in model) model.line_color = ROLES[mode].ink;
-    }
+    for (const model of figure.center) if ("grid_line_color" in model) model.grid_line_color = grid;
     for (const renderer of figure.renderers) {
       const chosen = colour_of(renderer.name, mode), glyph = renderer.glyph, changed = {};
-      if ("line_color" in glyph && renderer.name !== "pause" && renderer.name !== "trouble" && renderer.name !== "seen") {
-        if (!(glyph.type === "Scatter")) changed.line_color = chosen;
-      }
       if ("fill_color" in glyph) changed.fill_color = chosen;
+      else changed.line_color = chosen;
       glyph.setv(changed);
     }
   }

@@ -15,7 +15,17 @@ from inphase.report.page.figures import RUNS, SLOTS, make_figures
 from inphase.report.page.payload import MOST_NUMBERS, as_script, payload
 
 HERE = Path(__file__).parent
-SCRIPTS = ("numbers.js", "run.js", "drawing.js", "plots.js", "belief.js", "tables.js", "colours.js", "page.js")
+SCRIPTS = (
+    "numbers.js",
+    "run.js",
+    "drawing.js",
+    "cursor.js",
+    "plots.js",
+    "belief.js",
+    "tables.js",
+    "colours.js",
+    "page.js",
+)
 
 
 def write_page(path: str | PathLike[str], accounts: Sequence[Account], title: str | None = None) -> None:

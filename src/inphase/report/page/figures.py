@@ -35,7 +35,6 @@ def make_figures(runs: int) -> dict[str, Model]:
 
 def _empty(name: str, shared: Any) -> figure:
     from bokeh.models import BasicTicker, BoxZoomTool, PanTool, Range1d, ResetTool, WheelZoomTool
-    from bokeh.models.annotations import Span
     from bokeh.plotting import figure
 
     tools = [PanTool(), WheelZoomTool(dimensions="width", modifiers={"ctrl": True}), BoxZoomTool(), ResetTool()]
@@ -45,7 +44,9 @@ def _empty(name: str, shared: Any) -> figure:
         sizing_mode="stretch_width",
         min_width=100,
         x_range=shared,
-        y_range=Range1d(start=0, end=1),  # set by the script, for all steps together: nothing jumps while one looks through them
+        y_range=Range1d(
+            start=0, end=1
+        ),  # set by the script, for all steps together: nothing jumps while one looks through them
         tools=tools,
         toolbar_location="right",
         active_drag=None,  # a finger scrolls the page
@@ -54,7 +55,6 @@ def _empty(name: str, shared: Any) -> figure:
     made.toolbar.logo = None
     made.toolbar.autohide = True
     made.xaxis.ticker, made.yaxis.ticker = BasicTicker(desired_num_ticks=5), BasicTicker(desired_num_ticks=4)
-    made.add_layout(Span(location=0, dimension="height", name=f"{name}:cursor", line_width=1.5))
     return made
 
 
@@ -73,10 +73,6 @@ def _band(made: figure, name: str, role: str) -> None:
     made.varea("x", "low", "high", source=source, name=role, fill_alpha=0.25)
 
 
-def _points(made: figure, name: str, role: str) -> None:
-    made.scatter("x", "y", source=_source(f"{made.name}:{name}"), name=role, size=7, line_color=None)
-
-
 def _strips(made: figure, name: str, role: str, alpha: float) -> None:
     source = _source(f"{made.name}:{name}", left=0, right=0)
     made.vstrip("left", "right", source=source, name=role, line_color=None, fill_alpha=alpha)
@@ -84,9 +80,7 @@ def _strips(made: figure, name: str, role: str, alpha: float) -> None:
 
 def _observed(name: str, shared: Any) -> figure:
     made = _empty(name, shared)
-    _strips(made, "seen", "seen", 0.22)
     _line(made, "line", "ink")
-    _points(made, "now", "now")
     return made
 
 
@@ -98,7 +92,6 @@ def _controlled(name: str, shared: Any) -> figure:
     _line(made, "truth", "ink", line_width=2)
     _line(made, "sent", "sent", line_dash="dashed")
     _line(made, "response", "now", line_width=2)
-    _points(made, "now", "now")
     return made
 
 

@@ -56,6 +56,7 @@ function last_until(values, wanted) {
 // A curve with no more points than can be told apart between two places: of each stretch the lowest and the highest.
 // Only where x increases; a curve over the phase, which may turn back, is drawn as it is, thinned.
 function thin(x, y, from, until, most) {
+  if (!y.length) return {x: [], y: []};
   const increasing = x.length < 2 || x[x.length - 1] >= x[0];
   if (x.length <= 2 * most) return {x: Array.from(x), y: Array.from(y)};
   let start = 0, end = x.length;
@@ -85,4 +86,9 @@ function shown(value, digits = 3) {
   const size = Math.abs(value);
   if (size >= 1e5 || size < 1e-4) return value.toExponential(digits - 1);
   return String(Number(value.toPrecision(digits)));
+}
+
+function in_view(place) {
+  const {top, bottom} = place.getBoundingClientRect();
+  return bottom > -100 && top < window.innerHeight + 100;
 }

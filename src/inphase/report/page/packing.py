@@ -26,7 +26,9 @@ class Packing:
         self._add(name, np.ascontiguousarray(values, dtype=f"<{kind}"), kind, {})
 
     def put_quantised(self, name: str, values: Float[np.ndarray, "... C"]) -> None:
-        """In 16 bits a number, from the lowest to the highest of each last column; NaN stays NaN."""
+        """In 16 bits a number, from the lowest to the highest of each last column; NaN stays; NaN alone is no rows."""
+        if not np.isfinite(values).any():
+            values = values[:0]  # nothing is known: no rows
         columns = values.reshape(-1, values.shape[-1])
         finite = np.isfinite(columns)
         low = np.where(finite, columns, np.inf).min(0, initial=np.inf)

@@ -176,7 +176,7 @@ function listen() {
   window.addEventListener("scroll", () => {
     if (scrolled) return;
     scrolled = true;
-    requestAnimationFrame(() => { scrolled = false; belief.draw(state); });
+    requestAnimationFrame(() => { scrolled = false; draw(); });
   }, {passive: true});
 }
 

@@ -9,16 +9,30 @@ class Plots {
     this.slots = slots;
     this.document = Bokeh.documents[0];
     this.figures = [];
+    this.cursors = new Map();
     for (const place of document.querySelectorAll("[data-plot]")) {
       const figure = this.document.get_model_by_name(place.dataset.plot);
       this.figures.push(figure);
+      this.cursors.set(figure.name, new Cursor(place, figure));
     }
     this.range = this.document.get_model_by_name("across");
     let waiting = null;
     this.range.change.connect(() => {  // what is looked at more closely is drawn with more points
       clearTimeout(waiting);
       waiting = setTimeout(() => this.redraw(), 120);
+      this.remeasure();
     });
+    new ResizeObserver(() => this.remeasure()).observe(document.querySelector("main"));
+  }
+
+  // After bokeh has laid the figures out anew, the cursors have to be put where they belong.
+  remeasure() {
+    if (this.measuring) return;
+    this.measuring = requestAnimationFrame(() => requestAnimationFrame(() => {
+      this.measuring = null;
+      for (const cursor of this.cursors.values()) cursor.frame = null;
+      if (this.state) this.move(this.state);
+    }));
   }
 
   source(name) { return this.document.get_model_by_name(name); }
@@ -44,7 +58,11 @@ class Plots {
     this.source(name).y_range.setv({start, end, reset_start: start, reset_end: end});
   }
 
-  redraw() { if (this.state) this.still(this.state); }
+  redraw() {
+    if (!this.state) return;
+    this.still(this.state);
+    this.remeasure();
+  }
 
   // All that does not move with the step.
   still(state) {
@@ -120,38 +138,27 @@ class Plots {
     const run = state.run;
     const time = run.time(state.step);
     const x = run.across([time], state.axis)[0];
-    for (const figure of this.figures) {
-      if (figure.visible_now === false) continue;
-      this.document.get_model_by_name(`${figure.name}:cursor`).location = x;
-    }
-    this.move_observed(state, run, time, x);
+    const seen = this.seen(state, run, time);
     const frame = run.frame("frame_steps", state.step);
-    for (let slot = 0; slot < this.slots; slot++) {
-      const c = state.controlled[slot];
-      if (c !== undefined) this.move_controlled(slot, c, run, frame, state, x);
+    for (const [name, cursor] of this.cursors) {
+      if (!in_view(cursor.place)) continue;  // what is out of sight follows when it is scrolled to
+      const [kind, slot] = name.split("-"), k = state[kind]?.[Number(slot)];
+      if (kind === "observed" && k !== undefined) cursor.move(x, seen.across, seen.last < 0 ? NaN : run.column("observed", k)[seen.last]);
+      else cursor.move(x, null, kind === "controlled" && k !== undefined ? run.column("now", k)[state.step] ?? NaN : NaN);
+      if (kind === "controlled" && k !== undefined) this.answer(slot, k, run, frame, state);
     }
   }
 
-  move_observed(state, run, time, x) {
-    const before = state.step > 0 ? run.time(state.step - 1) : time;
-    const samples = run.list("sample_times");
+  // From where to where had been seen before this step, and the sample that came with it.
+  seen(state, run, time) {
+    const samples = run.list("sample_times"), before = state.step > 0 ? run.time(state.step - 1) : time;
     const last = samples.length ? last_until(samples, time + 1e-6) : -1;
-    // all that was seen until then lightly, what came with this step twice
-    const [begun, newest] = run.across([samples.length ? samples[0] : 0, before], state.axis);
-    const strip = {left: [begun, newest], right: [x, x]};
-    for (let slot = 0; slot < this.slots; slot++) {
-      const k = state.observed[slot];
-      if (k === undefined) continue;
-      this.fill(`observed-${slot}:seen`, strip);
-      const value = last >= 0 ? run.column("observed", k)[last] : NaN;
-      this.fill(`observed-${slot}:now`, Number.isNaN(value) ? {x: [], y: []} : {x: [x], y: [value]});
-    }
+    return {last, across: run.across([samples.length ? samples[0] : 0, before], state.axis)};
   }
 
-  move_controlled(slot, c, run, frame, state, x) {
+  // The response that stood at the step, and some before it.
+  answer(slot, c, run, frame, state) {
     const name = part => `controlled-${slot}:${part}`;
-    const now = run.column("now", c)[state.step];
-    this.fill(name("now"), now === undefined || Number.isNaN(now) ? {x: [], y: []} : {x: [x], y: [now]});
     const steps = run.has("frame_steps") ? run.list("frame_steps") : [];
     const past = {xs: [], ys: []};
     const across = response => state.axis === "time" ? response.times : response.phases;
