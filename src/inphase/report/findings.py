@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,11 +62,17 @@ def _of_lateness(account: Account) -> Iterator[Finding]:
         return
     how = "late" if late.seconds > 0 else "early"
     yield Finding(
-        f"The response came {abs(late.seconds):.2f} s {how}: moved by that it would have had "
-        f"{100 * (1 - late.remains):.0f} % less squared error.",
+        f"The response came {abs(late.seconds):.2f} s {how}: moved by that, " + _nearer(late.channels),
         _worst(account),
         grave=True,
     )
+
+
+def _nearer(channels: Mapping[str, float]) -> str:
+    """Which channels would have been how much nearer, those that gain most first."""
+    gains = sorted(channels.items(), key=lambda item: item[1])
+    told = ", ".join(f"{name} {100 * (1 - share):.0f} %" for name, share in gains[:MOST])
+    return f"the squared error would have been less: {told}."
 
 
 def _worst(account: Account) -> float | None:

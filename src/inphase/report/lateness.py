@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,11 +22,13 @@ WORTH = 0.8  # of the error as it is: a shift that leaves more of it explains no
 class Lateness:
     """By how much the answers came late, and what that explains.
 
-    seconds: negative where they were early. remains: the share of the squared error that is left when they are moved.
+    seconds: negative where they were early. remains: the share of the squared error that is left when they are moved,
+    by the geometric mean over channels. channels: those that come much nearer by it, with the share that they keep.
     """
 
     seconds: float
     remains: float
+    channels: Mapping[str, float]
 
     @property
     def explains(self) -> bool:
@@ -36,7 +39,8 @@ class Lateness:
 def lateness(account: Account, within: tuple[float, float] | None = None) -> Lateness | None:
     """Of all controlled channels together, or of the answers for the times within [s]; None where nothing is known.
 
-    The error of a channel counts by the spread of what it truly did, so that units do not matter.
+    The shift with the least sum of the logarithms of squared errors: the likeliest one, where every channel has an
+    error of a size of its own. Units do not matter, and a channel that is noise says nothing.
     """
     times, truth = account.times, account.truth
     known = np.isfinite(account.now) & np.isfinite(truth)
@@ -44,22 +48,22 @@ def lateness(account: Account, within: tuple[float, float] | None = None) -> Lat
     if not moving or len(times) < 3 or times[-1] <= times[0]:
         return None
     channels = [c for c in account.recording.channels if c.role is Role.CONTROLLED]
-    spread = np.array([truth[known[:, k], k].std() for k in range(truth.shape[1])])
     start, end = within or (times[0], times[-1])
     moments = np.linspace(start, end, MOMENTS)
     answered = _course(account.now_times, account.now, moments)
     farthest = FARTHEST * (times[-1] - times[0])
     shifts = np.linspace(-farthest, farthest, SHIFTS)
-    errors = np.empty(SHIFTS)
+    errors = np.empty((SHIFTS, len(moving)))
     for i, shift in enumerate(shifts.tolist()):
         happened = _course(times, truth, moments - shift)
-        off = difference(channels, answered, happened)[:, moving] / spread[moving]
-        errors[i] = np.nanmean(off**2)
-    as_it_is = errors[SHIFTS // 2]
-    if not as_it_is > 0:
-        return Lateness(0.0, 1.0)
-    best = int(errors.argmin())
-    return Lateness(float(shifts[best]), float(errors[best] / as_it_is))
+        errors[i] = np.nanmean(difference(channels, answered, happened)[:, moving] ** 2, axis=0)
+    least = np.finfo(float).eps * np.nanvar(truth[:, moving], axis=0)
+    logarithms = np.log(np.maximum(errors, least))
+    gains = logarithms - logarithms[SHIFTS // 2]
+    best = int(gains.mean(1).argmin())
+    kept = np.exp(gains[best])
+    nearer = {account.names[k]: float(share) for k, share in zip(moving, kept, strict=True) if share < WORTH}
+    return Lateness(float(shifts[best]), float(np.exp(gains[best].mean())), nearer)
 
 
 def _course(
