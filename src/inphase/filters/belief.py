@@ -34,6 +34,12 @@ def mixed(
     return over_all.reshape(shape), (weights @ (var + (mean - over_all) ** 2)).reshape(shape)
 
 
+def factor_of(cov: Float[np.ndarray, "R R"]) -> Float[np.ndarray, "R R"]:
+    """(R, R) rows whose square is this covariance, which may be singular."""
+    value, vector = np.linalg.eigh(cov)
+    return np.asarray(np.sqrt(np.maximum(value, 0.0))[:, None] * vector.T)
+
+
 @runtime_checkable
 class Belief(Protocol):
     """A distribution over the state [φ, φ̇, …, w]."""
@@ -49,6 +55,10 @@ class Belief(Protocol):
     @property
     def weights_mean(self) -> Float[np.ndarray, " B"]:
         """(B,) the mean of the basis weights."""
+
+    @property
+    def weights_factor(self) -> Float[np.ndarray, "N B"]:
+        """(N, B) rows whose square, factorᵀ factor, is the covariance of the basis weights; made anew at each call."""
 
     def trajectory(
         self, course: Course, features: Int[np.ndarray, " M"]
@@ -88,6 +98,10 @@ class GaussianBelief:
     def weights_mean(self) -> Float[np.ndarray, " B"]:
         prior = self.model.prior
         return frozen(prior.mean + self.mean[self._size :] @ prior.factor)
+
+    @property
+    def weights_factor(self) -> Float[np.ndarray, "N B"]:
+        return np.asarray(factor_of(self.cov[self._size :, self._size :]) @ self.model.prior.factor)
 
     @property
     def state_moments(self) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n n"]]:
@@ -160,6 +174,10 @@ class EnsembleBelief:
             return frozen(mean)
         kept = len(mean) - len(self.roots)
         return frozen(np.concatenate([mean[:kept], mean[kept:] @ self.roots]))
+
+    @property
+    def weights_factor(self) -> Float[np.ndarray, "N B"]:
+        return np.asarray((self.members[:, self._size :] - self.weights_mean) / np.sqrt(len(self.members) - 1))
 
     def readings(self, phases: Float[np.ndarray, "E S"], features: Int[np.ndarray, " M"]) -> Float[np.ndarray, "E S M"]:
         """What every member reads at phases of its own."""

@@ -81,6 +81,11 @@ class WeightedBelief:
     def weights_mean(self) -> Float[np.ndarray, " B"]:
         return frozen(np.bincount(self.origin, self.weights, minlength=len(self.drawn)) @ self.drawn)
 
+    @property
+    def weights_factor(self) -> Float[np.ndarray, "N B"]:
+        shares = np.bincount(self.origin, self.weights, minlength=len(self.drawn))
+        return np.asarray(np.sqrt(shares)[:, None] * (self.drawn - self.weights_mean))
+
     def readings(self, phases: Float[np.ndarray, "P S"], features: Int[np.ndarray, " M"]) -> Float[np.ndarray, "P S M"]:
         """What every particle reads at phases of its own."""
         return self.model.layout.predict_each(phases, self.drawn, features, self.origin)

@@ -16,7 +16,7 @@ from jaxtyping import Float, Int
 from inphase.arrays import frozen
 from inphase.errors import OptionError, listing
 from inphase.filters.alignment import WINDOW, Alignment, grid
-from inphase.filters.belief import Course, mixed
+from inphase.filters.belief import Course, factor_of, mixed
 from inphase.filters.candidates import Candidates
 from inphase.filters.conditioning import Foreseen, Weights, foresee
 from inphase.filters.filter import StepInfo
@@ -62,6 +62,15 @@ class PrompBelief:
         means = self.weights.means
         mean = means[0] if len(means) == 1 else self.timing.weights @ means
         return frozen(self.model.prior.mean + mean @ self.model.prior.factor)
+
+    @property
+    def weights_factor(self) -> Float[np.ndarray, "N B"]:
+        shares, means, covs = self.timing.weights, self.weights.means, self.weights.covs
+        if len(means) == 1:
+            return np.asarray(factor_of(covs[0]) @ self.model.prior.factor)
+        off = np.sqrt(shares)[:, None] * (means - shares @ means)
+        cov = np.tensordot(shares, covs, 1) + off.T @ off
+        return np.asarray(factor_of(cov) @ self.model.prior.factor)
 
     def trajectory(
         self, course: Course, features: Int[np.ndarray, " M"]

@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 
 from inphase.arrays import freeze, frozen
 from inphase.errors import OptionError
-from inphase.filters.belief import Course, mixed
+from inphase.filters.belief import Course, factor_of, mixed
 from inphase.filters.filter import StepInfo
 from inphase.filters.gaussian import ABSURD, forward
 from inphase.filters.resampling import effective_size, systematic
@@ -35,14 +35,16 @@ LOOKED_AT = 2000  # phases in a response, particles times samples; fewer particl
 class Directions:
     """The few directions of the prior in which weights are filtered, and what they leave of its variance.
 
-    rows: (R, B), w = mean + c @ rows. rest: (PHASES, F) variance by phase.
+    turn: (_, R) orthonormal. rows: (R, B) turnᵀ @ the prior's factor, w = mean + c @ rows. rest: (PHASES, F) variance
+    by phase.
     """
 
+    turn: Float[np.ndarray, "_ R"]
     rows: Float[np.ndarray, "R B"]
     rest: Float[np.ndarray, "_ F"]
 
     def __post_init__(self) -> None:
-        freeze(self, rows=self.rows, rest=self.rest)
+        freeze(self, turn=self.turn, rows=self.rows, rest=self.rest)
 
     def rest_at(self, phases: Float[np.ndarray, " P"], features: Int[np.ndarray, " M"]) -> Float[np.ndarray, "P M"]:
         """(P, M) the variance that is left over at each phase."""
@@ -91,6 +93,15 @@ class ParticleBelief:
     def weights_mean(self) -> Float[np.ndarray, " B"]:
         return frozen(self.model.prior.mean + self.weights @ self.means @ self.directions.rows)
 
+    @property
+    def weights_factor(self) -> Float[np.ndarray, "N B"]:
+        factor, directions = self.model.prior.factor, self.directions
+        off = np.sqrt(self.weights)[:, None] * (self.means - self.weights @ self.means)
+        cov = np.tensordot(self.weights, self.covs, 1) + off.T @ off
+        # What is not filtered is believed as before.
+        rest = factor - directions.turn @ directions.rows
+        return np.concatenate([factor_of(cov) @ directions.rows, rest])
+
     def trajectory(
         self, course: Course, features: Int[np.ndarray, " M"]
     ) -> tuple[Float[np.ndarray, "S M"], Float[np.ndarray, "S M"]]:
@@ -138,9 +149,10 @@ class Rbpf:
         turn, size, _ = np.linalg.svd(flat, full_matrices=False)
         share = np.cumsum(size**2) / max(float(np.sum(size**2)), np.finfo(float).tiny)
         kept = min(int(np.searchsorted(share, VARIANCE_KEPT)) + 1, MOST_DIRECTIONS, len(factor))
-        rows = turn[:, :kept].T @ factor
+        turn = turn[:, :kept]
+        rows = turn.T @ factor
         rest = (curves**2).sum(1) - (layout.project_each(grid, rows) ** 2).sum(1)
-        return Directions(rows, np.maximum(rest, 0.0))
+        return Directions(turn, rows, np.maximum(rest, 0.0))
 
     def init(self, rng: np.random.Generator) -> ParticleBelief:
         """The prior: every particle knows as little of the weights as the others."""

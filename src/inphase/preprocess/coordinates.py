@@ -153,6 +153,23 @@ class Coordinates:
             variances[:, xyzw] = np.einsum("scf,sf->sc", slopes * slopes, var[:, rotation])
         return values, variances
 
+    def jacobian(self, state: Float[np.ndarray, " F"]) -> Float[np.ndarray, "D F"] | None:
+        """(D, F) the derivative of the channels by the features, around a state (F,); None where each is its own.
+
+        The sign of a quaternion is the one that `turned` begins with: nearest to the reference.
+        """
+        if self.flat:
+            return None
+        slopes = np.zeros((len(self.channels), self.count))
+        slopes[self._single_channels, self._single_features] = 1.0
+        for xyzw, rotation in zip(self._quaternions, self._rotations, strict=True):
+            vector = state[None, rotation]
+            slope = quaternion.jacobian(vector, self.references[xyzw])[0]
+            # The derivative is that of the product reference · exp(r / 2), which may be the other sign of the same.
+            angle = np.sqrt((vector * vector).sum())
+            slopes[np.ix_(xyzw, rotation)] = slope if np.cos(angle / 2) >= 0 else -slope
+        return slopes
+
     @cached_property
     def _parts(self) -> tuple[tuple[int, ...], ...]:
         """The channels that make one or three features together, in the order of the first of them."""
