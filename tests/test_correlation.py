@@ -13,7 +13,7 @@ import inphase
 from inphase.basis import Gaussian, Layout
 from inphase.channels import make_channels
 from inphase.errors import ChannelError, OptionError
-from inphase.filters import FILTERS, Course
+from inphase.filters import FILTERS, Course, rbpf
 from inphase.noise import Noise
 from inphase.preprocess.coordinates import Coordinates
 from inphase.report.correlation import PHASES, channel_correlation, weight_correlation
@@ -113,6 +113,19 @@ def test_of_a_belief_it_is_that_of_its_weights(model, name):
     # What one seen weight correlates with, another does: the two matrices are of one covariance.
     factor = belief.weights_factor
     assert_allclose(weights, np.corrcoef(np.concatenate([factor, -factor]), rowvar=False), atol=1e-9)
+
+
+def test_what_rbpf_leaves_unfiltered_is_believed_as_before(model, monkeypatch):
+    monkeypatch.setattr(rbpf, "MOST_DIRECTIONS", 2)
+    session = model.session("rbpf", seed=1, particles=20)
+    factor = session.belief.weights_factor
+    assert_allclose(factor.T @ factor, model.prior.cov, atol=1e-9)
+    session.observe(0.0, model.predict([0.1])[0, :2])
+    belief, phase = session.belief, 40 / 99
+    assert belief.directions.rest.max() > 0
+    _, var = belief.trajectory(Course(np.zeros(1), np.array([phase])), np.arange(4))
+    rows = model.layout.project(phase, belief.weights_factor)
+    assert_allclose((rows**2).sum(0), var[0], rtol=1e-6)
 
 
 @pytest.mark.parametrize("phase", ["alignment", "candidates"])
