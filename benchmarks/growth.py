@@ -28,7 +28,7 @@ import inphase
 from inphase.errors import OptionError
 from inphase.filters import make
 from inphase.io.atomic import check_target, whole_file
-from inphase.report.replay_picture import check_picture
+from inphase.report.look import check_picture
 
 MIDDLE = Extent(channels=62, basis=8, members=125, demonstrations=62)
 AXES = {

@@ -8,8 +8,8 @@ import numpy as np
 
 from inphase.errors import OptionError
 from inphase.io.atomic import whole_file
-from inphase.report.accuracy_picture import COLOURS, MARKERS
-from inphase.report.replay_picture import INK
+from inphase.report.accuracy_picture import MARKERS
+from inphase.report.look import COLOURS, INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

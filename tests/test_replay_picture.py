@@ -14,7 +14,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 import inphase
 from inphase.cli.picture import panel
 from inphase.evaluation import replay
-from inphase.report.replay_picture import NINETY, ReplayPanel, busiest, check_picture, draw_replays, make_figure
+from inphase.report.look import NINETY, check_picture
+from inphase.report.replay_picture import ReplayPanel, busiest, draw_replays, make_figure
 
 LABELS = {
     "as recorded",

@@ -21,7 +21,8 @@ from inphase.errors import OptionError, listing
 from inphase.filters import FILTERS, RECOMMENDED
 from inphase.io import load
 from inphase.io.handwriting import check_shapes, export_handwriting
-from inphase.report.replay_picture import check_picture, draw_replays
+from inphase.report.look import check_picture
+from inphase.report.replay_picture import draw_replays
 from inphase.training import fit
 
 SHAPES = ("Angle", "GShape", "Sine", "Sshape")

@@ -23,7 +23,7 @@ from inphase.io.handwriting import check_shapes, export_handwriting
 from inphase.model import Model
 from inphase.recording import Recording
 from inphase.report.live_picture import Track, Truth, draw_run
-from inphase.report.replay_picture import check_picture
+from inphase.report.look import check_picture
 from inphase.runtime.configuration import devices, read_configuration
 from inphase.runtime.configuration.devices import Maker
 from inphase.runtime.device import Robot, Sample, Sensor

@@ -23,7 +23,7 @@ from inphase.evaluation.protocol import FOLDS
 from inphase.filters import FILTERS, RECOMMENDED
 from inphase.io.atomic import check_target, whole_file
 from inphase.report.accuracy_picture import draw_accuracy
-from inphase.report.replay_picture import check_picture
+from inphase.report.look import check_picture
 from inphase.training import fit
 from inphase.trajectory import Dataset
 

@@ -21,8 +21,8 @@ from inphase.io.atomic import check_target
 from inphase.io.files import episode_names
 from inphase.io.notes import unknown
 from inphase.model import Model
+from inphase.report.look import check_picture
 from inphase.report.overlay_picture import draw_overlay
-from inphase.report.replay_picture import check_picture
 from inphase.training import assess
 from inphase.trajectory import Dataset
 

@@ -19,7 +19,8 @@ from inphase.evaluation.replay import fitting
 from inphase.filters import RECOMMENDED
 from inphase.io.atomic import check_target
 from inphase.model import Model
-from inphase.report.replay_picture import check_picture, draw_replays
+from inphase.report.look import check_picture
+from inphase.report.replay_picture import draw_replays
 
 PANELS = 6  # replays in one picture
 

@@ -17,7 +17,7 @@ from inphase.cli.console import Output, counted, waiting
 from inphase.cli.reading import AsJson, Columns, Patterns, Recordings
 from inphase.errors import OptionError, listing
 from inphase.io.atomic import check_target
-from inphase.report.replay_picture import check_picture
+from inphase.report.look import check_picture
 from inphase.report.selection_picture import draw_selection
 from inphase.training.channel_selection import select_channels
 from inphase.training.information import ESTIMATORS

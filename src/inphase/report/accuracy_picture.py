@@ -13,14 +13,13 @@ from jaxtyping import Float
 from inphase.arrays import freeze
 from inphase.errors import OptionError
 from inphase.io.atomic import whole_file
-from inphase.report.replay_picture import INK, check_picture
+from inphase.report.look import COLOURS, INK, LINE, check_picture, plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 WANTED = 0.9  # of the readings inside a 90 % band
-COLOURS = ("#0b6e99", "#d1603d", "#e9a23b", "#3f8f5f", "#8e3b46", "#6d5aa8")
 GREYS = ("#8a929b", "#4a525b")  # baselines
 MARKERS, HOLLOW = "osD^vP", "sDo^"
 TOGETHER = 0.7  # of a condition's place is taken by its points
@@ -127,9 +126,7 @@ def _points(
 
 
 def _plain(axes: Axes, conditions: int) -> None:
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(axis="y", color="#e6e9ed", lw=0.7)
-    axes.set_axisbelow(True)
+    plain(axes, "y")
     axes.tick_params(axis="x", length=0)
     for border in range(conditions - 1):
-        axes.axvline(border + 0.5, color="#e6e9ed", lw=1)
+        axes.axvline(border + 0.5, color=LINE, lw=1)

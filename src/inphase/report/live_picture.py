@@ -14,7 +14,7 @@ from inphase.channels import Role
 from inphase.errors import OptionError
 from inphase.io.atomic import whole_file
 from inphase.recording import Recording
-from inphase.report.replay_picture import INK, NINETY, NOW, check_picture, plain
+from inphase.report.look import BAND, INK, NINETY, NOW, check_picture, plain, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,7 +80,7 @@ def make_figure(recording: Recording, truth: Truth | None = None, robot: Track |
     for above, name in zip(axes, drawn, strict=False):
         unit = next(channel.unit for channel in recording.channels if channel.name == name)
         _draw_channel(above, recording, truth, robot, name, begin)
-        above.set_ylabel(f"{name} [{unit}]" if unit else name)
+        above.set_ylabel(with_unit(name, unit))
     _draw_phase(axes[-1], recording, truth, begin)
     for one in axes:
         _shade(one, recording, begin)
@@ -112,7 +112,7 @@ def _draw_channel(
     now = [(r.times[0], r.mean[0, i], r.std[0, i]) for r in responses for i in [r.channels.index(name)]]
     if now:
         times, mean, std = np.array(now).T
-        axes.fill_between(times - begin, mean - NINETY * std, mean + NINETY * std, color=NOW, alpha=0.22, lw=0)
+        axes.fill_between(times - begin, mean - NINETY * std, mean + NINETY * std, color=NOW, alpha=BAND, lw=0)
         axes.plot(times - begin, mean, color=NOW, lw=1.6, label="response now, with 90 % band")
     if truth is not None:
         course = truth.values[:, truth.names.index(name)]
@@ -130,7 +130,7 @@ def _draw_phase(axes: Axes, recording: Recording, truth: Truth | None, begin: fl
     times, phases, stds = np.array([[e.time, e.phase, e.phase_std] for e in recording.estimates]).T
     if truth is not None:
         axes.plot(truth.times - begin, truth.phases, color=INK, lw=1.9)
-    axes.fill_between(times - begin, phases - NINETY * stds, phases + NINETY * stds, color=NOW, alpha=0.22, lw=0)
+    axes.fill_between(times - begin, phases - NINETY * stds, phases + NINETY * stds, color=NOW, alpha=BAND, lw=0)
     axes.plot(times - begin, phases, color=NOW, lw=1.6)
     axes.set_ylim(-0.05, 1.05)
     axes.set_ylabel("phase")

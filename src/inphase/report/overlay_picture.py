@@ -11,7 +11,7 @@ import numpy as np
 from inphase.channels import Role
 from inphase.io.atomic import whole_file
 from inphase.preprocess.coordinates import Coordinates
-from inphase.report.replay_picture import check_picture
+from inphase.report.look import PAST, check_picture, plain, with_unit
 from inphase.training.quality import Quality
 from inphase.trajectory import Dataset
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 MOST = 12  # channels, in three rows of four; more cannot be told apart
 COLOURS = ("#d1603d", "#0b6e99", "#e9a23b", "#6d5aa8", "#3f8f5f", "#8e3b46")  # outliers beyond share the last
-USUAL = "#9aa3ad"
 
 
 def draw_overlay(path: str | PathLike[str], dataset: Dataset, quality: Quality) -> None:
@@ -55,14 +54,14 @@ def make_figure(dataset: Dataset, quality: Quality) -> Figure:
         for demonstration, values in zip(dataset, features, strict=True):
             seen = ~np.isnan(values[:, f])
             if demonstration.name not in colours:
-                style = {"color": USUAL, "lw": 0.8, "alpha": 0.6, "zorder": 2}
+                style = {"color": PAST, "lw": 0.8, "alpha": 0.6, "zorder": 2}
             else:
                 here = coordinates.names[f] in named[demonstration.name]
                 style = {"color": colours[demonstration.name], "lw": 2.0 if here else 1.1, "zorder": 4 if here else 3}
             axes.plot(demonstration.phases[seen], values[seen, f], **style)
         channel = dataset.channels[coordinates.channel_of[f][0]]
         unit = "rad" if len(coordinates.channel_of[f]) > 1 else channel.unit
-        name = coordinates.names[f] + (f" [{unit}]" if unit else "")
+        name = with_unit(coordinates.names[f], unit)
         axes.set_title(name, fontsize=10, fontweight="bold" if channel.role is Role.CONTROLLED else "normal")
         _plain(axes)
     for axes in panels.flat[len(shown) :]:
@@ -96,7 +95,7 @@ def _legend(
     handles = [Line2D([], [], color=colour, lw=2, label=name) for name, colour in list(colours.items())[: len(COLOURS)]]
     if len(colours) > len(COLOURS):
         handles[-1].set_label(f"{len(colours) - len(COLOURS) + 1} others that are unlike")
-    handles.append(Line2D([], [], color=USUAL, lw=1.2, label=f"{usual} {'others' if colours else 'demonstrations'}"))
+    handles.append(Line2D([], [], color=PAST, lw=1.2, label=f"{usual} {'others' if colours else 'demonstrations'}"))
     figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 4), frameon=False)
     part = f"{shown} of {features} channels, those named and those that move most; " if shown < features else ""
     if dataset.controlled:
@@ -106,8 +105,6 @@ def _legend(
 
 
 def _plain(axes: Axes) -> None:
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(color="#e6e9ed", lw=0.7)
-    axes.set_axisbelow(True)
+    plain(axes)
     axes.set_xlim(0, 1)
     axes.tick_params(labelsize=8)

@@ -5,26 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
 
-from inphase.errors import OptionError, listing
+from inphase.errors import OptionError
 from inphase.io.atomic import whole_file
 from inphase.model import Model
+from inphase.report.look import BAND, INK, NINETY, NOW, check_picture, plain, with_unit
 from inphase.result import Estimate, Response
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SUFFIXES = (".png", ".svg", ".pdf")
 CHANNELS = 4  # of a single replay
 ACROSS = 4  # columns; at most so many, or nothing can be read
-NINETY = 1.6449  # standard deviations on either side that hold 90 % of a Gaussian
-INK, NOW = "#22272e", "#0b6e99"
 PREVIEWS = ("#e9a23b", "#d1603d", "#8e3b46")
 
 
@@ -45,16 +42,6 @@ class ReplayPanel:
     estimates: Sequence[Estimate]
     responses: Sequence[Response]
     previews: Mapping[float, Response]
-
-
-def check_picture(path: str | PathLike[str]) -> None:
-    """Raise OptionError where no such picture can be drawn: before the work of which it is to tell."""
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        raise OptionError("pictures need matplotlib: pip install 'inphase[plot]'") from None
-    if Path(path).suffix.lower() not in SUFFIXES:
-        raise OptionError(f"unknown kind of picture {str(path)!r}; its name must end in {listing(SUFFIXES)}")
 
 
 def draw_replays(path: str | PathLike[str], panels: Sequence[ReplayPanel]) -> None:
@@ -120,7 +107,7 @@ def _draw_response(axes: Axes, panel: ReplayPanel, channel: int) -> None:
         label = f"rest, foreseen at {100 * share:.0f} %"
         axes.plot(at, response.mean[:, channel], color=colour, lw=1.6, ls="--", label=label)
         axes.plot(at[0], response.mean[0, channel], "o", color=colour, ms=5)
-    axes.set_ylabel(f"{name} [{unit}]" if unit else name)
+    axes.set_ylabel(with_unit(name, unit))
     axes.set_xlim(0, 1.15 * times[-1])
     plain(axes)
 
@@ -135,12 +122,5 @@ def _draw_phase(axes: Axes, panel: ReplayPanel) -> None:
 
 
 def _band(axes: Axes, times: Any, mean: Any, std: Any, label: str | None) -> None:
-    axes.fill_between(times, mean - NINETY * std, mean + NINETY * std, color=NOW, alpha=0.22, lw=0)
+    axes.fill_between(times, mean - NINETY * std, mean + NINETY * std, color=NOW, alpha=BAND, lw=0)
     axes.plot(times, mean, color=NOW, lw=1.6, label=label)
-
-
-def plain(axes: Axes) -> None:
-    """Nothing but what tells something."""
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(color="#e6e9ed", lw=0.7)
-    axes.set_axisbelow(True)

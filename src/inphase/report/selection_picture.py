@@ -10,8 +10,7 @@ import numpy as np
 from inphase.basis import Basis
 from inphase.errors import OptionError
 from inphase.io.atomic import whole_file
-from inphase.report.accuracy_picture import COLOURS
-from inphase.report.replay_picture import INK, check_picture
+from inphase.report.look import COLOURS, INK, check_picture, plain, with_unit
 from inphase.training.selection import CRITERIA, BasisSelection
 from inphase.trajectory import Dataset
 
@@ -77,7 +76,7 @@ def _criterion(axes: Axes, selection: BasisSelection, name: str) -> None:
     axes.set_ylim(low - margin, high + margin)  # what is far too small or too large may leave the picture
     axes.set_title(TITLES[name], fontsize=10)
     axes.set_xlabel("functions")
-    _plain(axes)
+    plain(axes, "y")
 
 
 def _curves(axes: Axes, dataset: Dataset, name: str, basis: Basis) -> None:
@@ -93,12 +92,6 @@ def _curves(axes: Axes, dataset: Dataset, name: str, basis: Basis) -> None:
         axes.plot(at, readings, ".", ms=2.5, color="#b4bac1")
         axes.plot(phases, basis(phases) @ weights, lw=1.3, color=COLOURS[0])
     unit = dataset.channels[column].unit
-    axes.set_title(f"{name} [{unit}]" if unit else name, fontsize=10)
+    axes.set_title(with_unit(name, unit), fontsize=10)
     axes.set_xlabel("phase")
-    _plain(axes)
-
-
-def _plain(axes: Axes) -> None:
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(axis="y", color="#e6e9ed", lw=0.7)
-    axes.set_axisbelow(True)
+    plain(axes, "y")
