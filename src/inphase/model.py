@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
@@ -27,6 +27,8 @@ from inphase.tempo import Tempo
 from inphase.weight_prior import WeightPrior
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from inphase.session import Session
 
 
@@ -158,7 +160,7 @@ class Model:
             raise OptionError(f"expected finite phases (P,), got shape {at.shape}")
         return at
 
-    # The three doors upward (docs/decisions/0001-doors.md): what a user looks for on a model, wherever it lives.
+    # The doors upward (docs/decisions/0001-doors.md): what a user looks for on a model, wherever it lives.
 
     def session(self, filter: str | None = None, seed: int = 0, **options: Any) -> Session:
         """A session that follows one interaction live; `options` are those of the filter, None the recommended one.
@@ -181,3 +183,17 @@ class Model:
         from inphase.io.model_file import read_model
 
         return read_model(path)
+
+    def plot(self, *, channels: Sequence[str] | str | None = None, **options: Any) -> Figure:
+        """A picture of each channel's mean and 90 % band over phase: `inphase.report.plot_model`, with its options.
+
+        Raises ChannelError, and OptionError where matplotlib is missing.
+        """
+        from inphase.report.plots.model import plot_model
+
+        return plot_model(self, channels=channels, **options)
+
+    def _repr_html_(self) -> str:
+        from inphase.report.notebook import model_html
+
+        return model_html(self)

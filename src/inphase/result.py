@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
 
 from inphase.arrays import freeze
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class Status(str, enum.Enum):
@@ -44,6 +49,11 @@ class Estimate:
     log_likelihood: float
     status: Status
 
+    def _repr_html_(self) -> str:
+        from inphase.report.notebook import estimate_html
+
+        return estimate_html(self)
+
 
 @dataclass(frozen=True, eq=False)
 class Response:
@@ -63,3 +73,19 @@ class Response:
 
     def __len__(self) -> int:
         return len(self.times)
+
+    # Doors upward: docs/decisions/0014-pictures.md.
+
+    def plot(self, *, channels: Sequence[str] | str | None = None, phase: bool = False, **options: Any) -> Figure:
+        """A picture of each channel's mean and 90 % band over time: `inphase.report.plot_response`, with its options.
+
+        Raises ChannelError, and OptionError where matplotlib is missing.
+        """
+        from inphase.report.plots.response import plot_response
+
+        return plot_response(self, channels=channels, phase=phase, **options)
+
+    def _repr_html_(self) -> str:
+        from inphase.report.notebook import response_html
+
+        return response_html(self)

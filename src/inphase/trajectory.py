@@ -137,6 +137,11 @@ class Dataset:
         roles = f"observed: {listing(self.observed)}; controlled: {listing(self.controlled)}"
         return f"Dataset({len(self)} demonstrations, {roles})"
 
+    def _repr_html_(self) -> str:
+        from inphase.report.notebook import dataset_html  # a door upward: docs/decisions/0014-pictures.md
+
+        return dataset_html(self)
+
     def __iter__(self) -> Iterator[Demonstration]:
         return iter(self.demonstrations)
 

@@ -10,6 +10,7 @@ from jaxtyping import Float
 from inphase.channels import Channel, Kind, quaternions
 from inphase.metrics import difference
 from inphase.preprocess.checks.rotation import sign_continuous
+from inphase.preprocess.coordinates import Coordinates
 
 
 def steady(channels: Sequence[Channel], values: Float[np.ndarray, "T D"]) -> Float[np.ndarray, "T D"]:
@@ -25,6 +26,17 @@ def steady(channels: Sequence[Channel], values: Float[np.ndarray, "T D"]) -> Flo
         if seen.any():
             drawn[np.ix_(seen, columns)] = sign_continuous(drawn[seen][:, columns])
     return drawn
+
+
+def steady_together(
+    channels: Sequence[Channel], values: Sequence[Float[np.ndarray, "_ D"]]
+) -> list[Float[np.ndarray, "_ D"]]:
+    """Several trajectories (T, D), each steady and all on the branch near their mean; quaternions have norm 1."""
+    coordinates = Coordinates.learn(channels, values)
+    if coordinates.flat:
+        return [*values]
+    features = [coordinates.from_channels(one) for one in values]
+    return [coordinates.to_channels(one, np.zeros_like(one))[0] for one in features]
 
 
 def beside(
