@@ -137,3 +137,21 @@ def chance_model(
         phase=phase,
         spread=np.ones(4),
     )
+
+
+def wide_model(count: int, *, functions: int = 8, shrinkage: float = 0.0, trust: float = 1.0) -> inphase.Model:
+    """A model of `count` channels, half of them observed, with weights of chance: nothing was learned."""
+    half = count // 2
+    channels = make_channels([f"a{i}" for i in range(half)], [f"b{i}" for i in range(count - half)])
+    layout, rng = Layout((Gaussian(functions),) * count), np.random.default_rng(count)
+    blocks, samples = (functions,) * count, rng.normal(size=(8, layout.size))
+    return inphase.Model(
+        channels=channels,
+        coordinates=Coordinates(channels, np.zeros(count)),
+        scaling=inphase.Scaling.none(count),
+        layout=layout,
+        prior=WeightPrior(samples, shrinkage, trust, half * functions, blocks),
+        noise=Noise(np.full(count, 0.01), np.zeros(count)),
+        phase=phase_model(),
+        spread=np.ones(count),
+    )

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from interactions import chance_model, phase_model
+from interactions import chance_model, phase_model, wide_model
 from numpy.testing import assert_allclose
 
 import inphase
@@ -157,23 +158,15 @@ def test_a_channel_that_never_varies_correlates_with_itself_alone(model):
     assert_correlation(got, 4)
 
 
-def test_of_many_channels_no_matrix_of_all_weights_is_made(rng):
+def test_of_many_channels_no_matrix_of_all_weights_is_made():
     """500 channels of 15 functions, shrunk: 7,500 weights, whose covariance alone would take 450 MB."""
-    import tracemalloc
-
-    count, layout = 500, Layout((Gaussian(15),) * 500)
-    channels = make_channels([f"a{i}" for i in range(250)], [f"b{i}" for i in range(250)])
-    model = inphase.Model(
-        channels, Coordinates(channels, np.zeros(count)), inphase.Scaling.none(count), layout,
-        WeightPrior(rng.normal(size=(8, layout.size)), 0.2, 0.5, 250 * 15, (15,) * count),
-        Noise(np.ones(count), np.zeros(count)), phase_model(), np.ones(count),
-    )  # fmt: skip
+    model = wide_model(500, functions=15, shrinkage=0.2, trust=0.5)
     tracemalloc.start()
     got = channel_correlation(model)
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert most < 50e6
-    assert_correlation(got, count)
+    assert_correlation(got, 500)
 
 
 def test_a_phase_that_is_none_is_refused(model):

@@ -35,10 +35,18 @@ def phase_density(
 
 
 def tempo_density(mixture: PhaseMixture, grid: Float[np.ndarray, " G"]) -> Float[np.ndarray, " G"]:
-    """(G,) the density of the phase velocity at velocities (G,) [1/s]; raises OptionError where none is believed."""
+    """(G,) the density of the phase velocity at velocities (G,) [1/s].
+
+    Points are smoothed as above; where none goes backwards, neither does what is drawn. Raises OptionError for a belief
+    that knows no velocity.
+    """
     if mixture.centres.shape[1] < 2:
         raise OptionError("expected a belief of phase and tempo, got one of the phase alone (a phase prior of order 0)")
-    return _sum(mixture, mixture.centres[:, 1], _width(mixture, 1, float(np.ptp(grid)) * NARROWEST), grid)
+    points, width = mixture.centres[:, 1], _width(mixture, 1, float(np.ptp(grid)) * NARROWEST)
+    density = _sum(mixture, points, width, grid)
+    if mixture.cov[1, 1] == 0 and points.min() >= 0:
+        density = np.where(grid >= 0, density + _sum(mixture, -points, width, grid), 0.0)
+    return density
 
 
 def _width(mixture: PhaseMixture, column: int, least: float) -> float:

@@ -21,6 +21,7 @@ Axes: TypeAlias = "AnyAxes | Sequence[AnyAxes] | np.ndarray | None"  # what a ca
 
 UNASKED = 12  # channels in three rows of four; who wants more names them
 MOST = 60  # panels: beyond, nothing can be read
+KEY_WIDTH, LETTER_WIDTH = 0.6, 0.095  # [in] of an entry in the legend
 
 
 def chosen(channels: Sequence[Channel], wanted: Sequence[str] | str | None) -> list[int]:
@@ -101,7 +102,9 @@ def finish(figure: Figure, panels: Sequence[AnyAxes], note: str = "") -> None:
     for axes in panels:
         entries |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     if entries:
-        columns = min(len(entries), 4 if figure.get_figwidth() > 6 else 2)
+        longest = max(len(label) for label in entries)
+        columns = int(figure.get_figwidth() / (KEY_WIDTH + LETTER_WIDTH * longest))
+        columns = max(1, min(columns, len(entries), 4))
         figure.legend([*entries.values()], [*entries], loc="outside lower center", ncols=columns, frameon=False)
     if note:
         figure.suptitle(note, fontsize=10)
