@@ -20,9 +20,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 import inphase
 from inphase import report
 from inphase.errors import ChannelError, OptionError
-from inphase.filters import FILTERS, Belief, PhaseMixture
+from inphase.filters import FILTERS, Belief
+from inphase.filters.cloud import Cloud
 from inphase.recording import Recording
-from inphase.report.density import phase_density, tempo_density
+from inphase.report.density import cloud_of, phase_density, tempo_density
 from inphase.report.look import NINETY
 from inphase.report.plots.correlation import NEGATIVE, POSITIVE
 
@@ -218,17 +219,18 @@ def area(grid: np.ndarray, density: np.ndarray) -> float:
 
 @pytest.mark.parametrize("name", FILTERS)
 def test_every_belief_tells_all_of_its_phase(told, name):
-    """Its mixture has its moments, and the density drawn has them too, but for smoothing."""
+    """Its cloud has its moments, and the density drawn has them too, but for smoothing."""
     session = told.model.session(name, seed=1, **OPTIONS[name])
     for time, values in zip(told.demos[0].times[:20], told.demos[0].values, strict=False):
         session.observe(time, values[:2])
-    belief, mixture = session.belief, session.belief.phase_mixture
-    mean = mixture.shares @ mixture.centres
-    off = mixture.centres - mean
-    cov = (off.T * mixture.shares) @ off + mixture.cov
-    assert mixture.shares.sum() == pytest.approx(1)
+    belief, seen = session.belief, cloud_of(session.belief)
+    mean = seen.weights @ seen.moving
+    off = seen.moving - mean
+    cov = (off.T * seen.weights) @ off + np.diag(seen.weights @ seen.moving_var)
+    assert seen.weights.sum() == pytest.approx(1)
     assert_allclose(mean[:2], belief.phase_mean[:2], atol=1e-9)
-    assert_allclose(cov[:2, :2], belief.phase_cov[:2, :2], rtol=1 / 59 + 1e-6, atol=1e-9)  # an ensemble's is unbiased
+    # An ensemble's is unbiased.
+    assert_allclose(np.diag(cov), np.diag(belief.phase_cov)[:2], rtol=1 / 59 + 1e-6, atol=1e-9)
     left, right = report.plot_phase_densities(belief).axes
     for axes, column in ((left, 0), (right, 1)):
         grid, density = lines(axes)[0].T
@@ -248,15 +250,20 @@ def test_a_gaussian_is_drawn_as_one(told):
         assert_allclose(density, np.exp(-0.5 * ((grid - mean) / std) ** 2) / (std * np.sqrt(2 * np.pi)), atol=1e-12)
 
 
+def points_at(shares: list[float], moving: list[list[float]]) -> Cloud:
+    count = len(shares)
+    moved = np.array(moving)
+    return Cloud(np.array(shares), moved, np.zeros_like(moved), np.empty((count, 0)), np.empty((1, 0, 0)))
+
+
 def test_points_stay_inside_and_a_circle_is_closed():
-    points = np.array([[0.0, 0.5], [0.02, 0.6], [0.05, 0.4]])
-    mixture = PhaseMixture(np.array([0.5, 0.3, 0.2]), points, np.zeros((2, 2)))
-    assert area(GRID, phase_density(mixture, GRID)) == pytest.approx(1, abs=1e-3)
-    straddling = PhaseMixture(np.full(2, 0.5), np.array([[-0.03, 1.0], [0.04, 1.0]]), np.zeros((2, 2)))
+    early = points_at([0.5, 0.3, 0.2], [[0.0, 0.5], [0.02, 0.6], [0.05, 0.4]])
+    assert area(GRID, phase_density(early, GRID)) == pytest.approx(1, abs=1e-3)
+    straddling = points_at([0.5, 0.5], [[-0.03, 1.0], [7.04, 1.0]])
     round_it = phase_density(straddling, GRID, periodic=True)
     assert area(GRID, round_it) == pytest.approx(1, abs=1e-3)
     assert round_it[0] == pytest.approx(round_it[-1])
-    one = PhaseMixture(np.ones(1), np.array([[0.3, 0.7]]), np.zeros((2, 2)))  # all of it at one place is still seen
+    one = points_at([1.0], [[0.3, 0.7]])  # all of it at one place is still seen
     assert area(GRID, phase_density(one, GRID)) == pytest.approx(1, abs=1e-3)
     assert area(GRID, tempo_density(one, GRID)) == pytest.approx(1, abs=1e-3)
 
@@ -285,10 +292,12 @@ def test_moments_of_a_recording_are_picked_by_time(told):
             report.plot_phase_densities(wrong, at=at)
 
 
-def test_a_belief_without_a_tempo_is_told(told):
-    still = chance_model(np.random.default_rng(0), phase_model(order=0)).session("bip")
-    with pytest.raises(OptionError, match="of the phase alone"):
-        report.plot_phase_densities(still)
+def test_a_belief_without_a_tempo_has_that_of_the_demonstrations():
+    still = chance_model(np.random.default_rng(0), phase_model(order=0))
+    _, right = report.plot_phase_densities(still.session("bip")).axes
+    grid, density = lines(right)[0].T
+    assert area(grid, density) == pytest.approx(1, abs=0.01)
+    assert grid[density.argmax()] == pytest.approx(still.phase.nominal_velocity, rel=0.01)
 
 
 # ---------------------------------------------------------------------------------------------------------- the page

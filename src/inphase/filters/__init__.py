@@ -6,7 +6,7 @@ from dataclasses import fields
 from typing import Any
 
 from inphase.errors import OptionError, listing
-from inphase.filters.belief import Belief, Course, EnsembleBelief, GaussianBelief, PhaseMixture
+from inphase.filters.belief import Belief, Course, EnsembleBelief, GaussianBelief
 from inphase.filters.bip import Bip
 from inphase.filters.ebip import Ebip
 from inphase.filters.filter import Filter, StepInfo
@@ -37,7 +37,6 @@ __all__ = [
     "GaussianBelief",
     "Particle",
     "ParticleBelief",
-    "PhaseMixture",
     "Promp",
     "PrompBelief",
     "Rbpf",

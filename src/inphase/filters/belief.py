@@ -9,7 +9,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float, Int
 
-from inphase.arrays import freeze, frozen
+from inphase.arrays import frozen
 from inphase.model import Model
 
 
@@ -40,21 +40,6 @@ def factor_of(cov: Float[np.ndarray, "R R"]) -> Float[np.ndarray, "R R"]:
     return np.asarray(np.sqrt(np.maximum(value, 0.0))[:, None] * vector.T)
 
 
-@dataclass(frozen=True, eq=False)
-class PhaseMixture:
-    """Phase and its derivatives as a mixture of Gaussians; of filters that draw, points that have no width.
-
-    shares: (P,) their probabilities. centres: (P, K). cov: (K, K) of every one of them.
-    """
-
-    shares: Float[np.ndarray, " P"]
-    centres: Float[np.ndarray, "P K"]
-    cov: Float[np.ndarray, "K K"]
-
-    def __post_init__(self) -> None:
-        freeze(self, shares=self.shares, centres=self.centres, cov=self.cov)
-
-
 @runtime_checkable
 class Belief(Protocol):
     """A distribution over the state [φ, φ̇, …, w]."""
@@ -70,10 +55,6 @@ class Belief(Protocol):
     @property
     def phase_cov(self) -> Float[np.ndarray, "K K"]:
         """(K, K) their covariance."""
-
-    @property
-    def phase_mixture(self) -> PhaseMixture:
-        """All that is believed of them, made anew at each call."""
 
     @property
     def weights_mean(self) -> Float[np.ndarray, " B"]:
@@ -116,10 +97,6 @@ class GaussianBelief:
     @property
     def phase_cov(self) -> Float[np.ndarray, "K K"]:
         return self.cov[: self._size, : self._size]
-
-    @property
-    def phase_mixture(self) -> PhaseMixture:
-        return PhaseMixture(np.ones(1), self.phase_mean[None], self.phase_cov)
 
     @cached_property
     def weights_mean(self) -> Float[np.ndarray, " B"]:
@@ -193,11 +170,6 @@ class EnsembleBelief:
     def phase_cov(self) -> Float[np.ndarray, "K K"]:
         off = self.carried[:, : self._size] - self.phase_mean
         return frozen(off.T @ off / (len(off) - 1))
-
-    @property
-    def phase_mixture(self) -> PhaseMixture:
-        count, size = len(self.carried), self._size
-        return PhaseMixture(np.full(count, 1 / count), self.carried[:, :size], np.zeros((size, size)))
 
     @cached_property
     def weights_mean(self) -> Float[np.ndarray, " B"]:

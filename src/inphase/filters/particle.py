@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 
 from inphase.arrays import frozen
 from inphase.errors import OptionError, listing
-from inphase.filters.belief import Course, PhaseMixture
+from inphase.filters.belief import Course
 from inphase.filters.filter import StepInfo
 from inphase.filters.gaussian import spread_score
 from inphase.filters.motion import advance, begin
@@ -76,11 +76,6 @@ class WeightedBelief:
     def phase_cov(self) -> Float[np.ndarray, "K K"]:
         off = self._moving - self.weights @ self._moving
         return frozen((off * self.weights[:, None]).T @ off)
-
-    @property
-    def phase_mixture(self) -> PhaseMixture:
-        size = self._moving.shape[1]
-        return PhaseMixture(self.weights, self._moving, np.zeros((size, size)))
 
     @cached_property
     def weights_mean(self) -> Float[np.ndarray, " B"]:

@@ -16,7 +16,7 @@ from jaxtyping import Float, Int
 from inphase.arrays import frozen
 from inphase.errors import OptionError, listing
 from inphase.filters.alignment import WINDOW, Alignment, grid
-from inphase.filters.belief import Course, PhaseMixture, factor_of, mixed
+from inphase.filters.belief import Course, factor_of, mixed
 from inphase.filters.candidates import Candidates
 from inphase.filters.conditioning import Foreseen, Weights, foresee
 from inphase.filters.filter import StepInfo
@@ -56,10 +56,6 @@ class PrompBelief:
     def phase_cov(self) -> Float[np.ndarray, "K K"]:
         off = self._moving - self.phase_mean
         return frozen((off * self.timing.weights[:, None]).T @ off + np.diag([0.0, self.timing.tempo_var]))
-
-    @property
-    def phase_mixture(self) -> PhaseMixture:
-        return PhaseMixture(self.timing.weights, self._moving, np.diag([0.0, self.timing.tempo_var]))
 
     @cached_property
     def weights_mean(self) -> Float[np.ndarray, " B"]:

@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 
 from inphase.arrays import freeze, frozen
 from inphase.errors import OptionError
-from inphase.filters.belief import Course, PhaseMixture, factor_of, mixed
+from inphase.filters.belief import Course, factor_of, mixed
 from inphase.filters.filter import StepInfo
 from inphase.filters.gaussian import ABSURD, forward
 from inphase.filters.resampling import effective_size, systematic
@@ -88,11 +88,6 @@ class ParticleBelief:
     def phase_cov(self) -> Float[np.ndarray, "K K"]:
         off = self._moving - self.phase_mean
         return frozen((off * self.weights[:, None]).T @ off)
-
-    @property
-    def phase_mixture(self) -> PhaseMixture:
-        size = self._moving.shape[1]
-        return PhaseMixture(self.weights, self._moving, np.zeros((size, size)))
 
     @cached_property
     def weights_mean(self) -> Float[np.ndarray, " B"]:

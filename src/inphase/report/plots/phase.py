@@ -9,9 +9,10 @@ import numpy as np
 from jaxtyping import Float
 
 from inphase.errors import OptionError
-from inphase.filters import Belief, PhaseMixture
+from inphase.filters import Belief
+from inphase.filters.cloud import Cloud
 from inphase.recording import Recording
-from inphase.report.density import mixture_of, phase_density, tempo_density
+from inphase.report.density import cloud_of, phase_density, tempo_density
 from inphase.report.look import COLOURS, plain, verbatim
 from inphase.report.plots.panels import Axes, finish, make_panels
 from inphase.result import Estimate
@@ -39,16 +40,16 @@ def plot_phase_densities(moments: Moments, *, at: Sequence[float] | None = None,
     if not 0 < len(named) <= 2 * len(COLOURS):
         raise OptionError(f"expected 1 to {2 * len(COLOURS)} moments in a figure, got {len(named)}")
     figure, (left, right) = make_panels(2, axes)
-    mixtures = {name: _mixture(moment) for name, moment in named.items()}
-    phases, tempos = np.linspace(0, 1, GRID), _tempos([*mixtures.values()])
-    for i, (name, mixture) in enumerate(mixtures.items()):
+    beliefs = {name: moment.belief if isinstance(moment, Session) else moment for name, moment in named.items()}
+    clouds = [cloud_of(belief) for belief in beliefs.values()]
+    phases, tempos = np.linspace(0, 1, GRID), _tempos(clouds)
+    for i, ((name, belief), seen) in enumerate(zip(beliefs.items(), clouds, strict=True)):
         label, style = verbatim(name) if name else "_nolegend_", "-" if i < len(COLOURS) else "--"
-        colour, moment = COLOURS[i % len(COLOURS)], named[name]
-        belief = moment.belief if isinstance(moment, Session) else moment
+        colour = COLOURS[i % len(COLOURS)]
         periodic = not isinstance(belief, Estimate) and belief.model.phase.periodic
         for panel, grid, density in (
-            (left, phases, phase_density(mixture, phases, periodic)),
-            (right, tempos, tempo_density(mixture, tempos)),
+            (left, phases, phase_density(seen, phases, periodic)),
+            (right, tempos, tempo_density(seen, tempos)),
         ):
             panel.fill_between(grid, 0, density, color=colour, alpha=0.15, lw=0)
             panel.plot(grid, density, style, color=colour, lw=1.6, label=label)
@@ -101,25 +102,20 @@ def _at(estimates: Sequence[Estimate], at: Sequence[float] | None) -> list[Estim
     return [estimates[int(i) - 1] for i in np.searchsorted(times, at, side="right")]
 
 
-def _mixture(moment: Moment) -> PhaseMixture:
-    if isinstance(moment, Estimate):
-        return mixture_of(moment)
-    return (moment.belief if isinstance(moment, Session) else moment).phase_mixture
-
-
-def _tempos(mixtures: Sequence[PhaseMixture]) -> Float[np.ndarray, " G"]:
+def _tempos(clouds: Sequence[Cloud]) -> Float[np.ndarray, " G"]:
     """A grid of velocities that holds nearly all of every density."""
-    if any(mixture.centres.shape[1] < 2 for mixture in mixtures):
-        raise OptionError("expected beliefs of phase and tempo, got one of the phase alone (a phase prior of order 0)")
-    lows, highs = [], []
-    for mixture in mixtures:
-        points, shares = mixture.centres[:, 1], mixture.shares
+    lows, highs, forward = [], [], True
+    for seen in clouds:
+        points, shares, var = seen.moving[:, 1], seen.weights, seen.moving_var[:, 1]
         mean = float(shares @ points)
-        std = float(np.sqrt(max(float(shares @ (points - mean) ** 2) + mixture.cov[1, 1], 0.0)))
-        lows.append(mean - 4 * std)
-        highs.append(mean + 4 * std)
-        if mixture.cov[1, 1] == 0:  # points that go no further
-            lows[-1], highs[-1] = max(lows[-1], points.min() - std), min(highs[-1], points.max() + std)
-    low, high = min(lows), max(highs)
-    low = max(low, 0.0) if all(mixture.centres[:, 1].min() >= 0 for mixture in mixtures) else low
-    return np.linspace(low, max(high, low + 1e-3), GRID)
+        std = float(np.sqrt(max(float(shares @ ((points - mean) ** 2 + var)), 0.0)))
+        low, high = mean - 4 * std, mean + 4 * std
+        if not var.any():  # points go no further
+            low, high = max(low, points.min() - std), min(high, points.max() + std)
+        lows.append(low)
+        highs.append(high)
+        forward = forward and points.min() >= 0
+    first = max(min(lows), 0.0) if forward else min(lows)
+    middle = (first + max(highs)) / 2
+    half = max(max(highs) - middle, 0.05 * abs(middle), 1e-9)  # of a tempo that is known, too
+    return np.linspace(max(middle - half, 0.0) if forward else middle - half, middle + half, GRID)
