@@ -96,13 +96,13 @@ def test_of_a_belief_it_is_that_of_its_weights(model, name):
     """And they have just the variance that the belief's own trajectory has at a phase that is named."""
     session = model.session(name, seed=1, **OPTIONS[name])
     if name in ("bip", "promp", "rbpf"):  # the others draw
-        factor = session.belief.weights_factor
+        factor = session.belief.weights_factor()
         assert_allclose(factor.T @ factor, model.prior.cov, atol=1e-9)
     for time in np.arange(8) / 20:
         session.observe(time, model.predict([0.05 + 0.8 * time])[0, :2] + 0.02)
     belief, phase = session.belief, 5 / 99  # one that rbpf has in its table
     layout, everything = model.layout, np.arange(4)
-    rows = layout.project(phase, belief.weights_factor)
+    rows = layout.project(phase, belief.weights_factor())
     mean, var = belief.trajectory(Course(np.zeros(1), np.array([phase])), everything)
     assert_allclose((rows**2).sum(0), var[0], rtol=1e-6)
     assert_allclose(layout.predict(np.array([phase]), belief.weights_mean), mean, rtol=1e-6)
@@ -112,20 +112,20 @@ def test_of_a_belief_it_is_that_of_its_weights(model, name):
     names, weights = weight_correlation(model, belief)
     assert len(names) == layout.size
     # What one seen weight correlates with, another does: the two matrices are of one covariance.
-    factor = belief.weights_factor
+    factor = belief.weights_factor()
     assert_allclose(weights, np.corrcoef(np.concatenate([factor, -factor]), rowvar=False), atol=1e-9)
 
 
 def test_what_rbpf_leaves_unfiltered_is_believed_as_before(model, monkeypatch):
     monkeypatch.setattr(rbpf, "MOST_DIRECTIONS", 2)
     session = model.session("rbpf", seed=1, particles=20)
-    factor = session.belief.weights_factor
+    factor = session.belief.weights_factor()
     assert_allclose(factor.T @ factor, model.prior.cov, atol=1e-9)
     session.observe(0.0, model.predict([0.1])[0, :2])
     belief, phase = session.belief, 40 / 99
     assert belief.directions.rest.max() > 0
     _, var = belief.trajectory(Course(np.zeros(1), np.array([phase])), np.arange(4))
-    rows = model.layout.project(phase, belief.weights_factor)
+    rows = model.layout.project(phase, belief.weights_factor())
     assert_allclose((rows**2).sum(0), var[0], rtol=1e-6)
 
 
@@ -136,7 +136,7 @@ def test_both_kinds_of_promp_keep_their_variance(model, phase):
         session.observe(time, model.predict([0.8 * time])[0, :2])
     belief, everything = session.belief, np.arange(4)
     _, var = belief.trajectory(Course(np.zeros(1), np.array([0.5])), everything)
-    rows = model.layout.project(0.5, belief.weights_factor)
+    rows = model.layout.project(0.5, belief.weights_factor())
     assert_allclose((rows**2).sum(0), var[0], rtol=1e-9)
 
 

@@ -60,9 +60,8 @@ class Belief(Protocol):
     def weights_mean(self) -> Float[np.ndarray, " B"]:
         """(B,) the mean of the basis weights."""
 
-    @property
     def weights_factor(self) -> Float[np.ndarray, "N B"]:
-        """(N, B) rows whose square, factorᵀ factor, is the covariance of the basis weights; made anew at each call."""
+        """(N, B) rows whose square, factorᵀ factor, is the covariance of the basis weights."""
 
     def trajectory(
         self, course: Course, features: Int[np.ndarray, " M"]
@@ -103,7 +102,6 @@ class GaussianBelief:
         prior = self.model.prior
         return frozen(prior.mean + self.mean[self._size :] @ prior.factor)
 
-    @property
     def weights_factor(self) -> Float[np.ndarray, "N B"]:
         return np.asarray(factor_of(self.cov[self._size :, self._size :]) @ self.model.prior.factor)
 
@@ -179,7 +177,6 @@ class EnsembleBelief:
         kept = len(mean) - len(self.roots)
         return frozen(np.concatenate([mean[:kept], mean[kept:] @ self.roots]))
 
-    @property
     def weights_factor(self) -> Float[np.ndarray, "N B"]:
         return np.asarray((self.members[:, self._size :] - self.weights_mean) / np.sqrt(len(self.members) - 1))
 

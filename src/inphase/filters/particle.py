@@ -81,7 +81,6 @@ class WeightedBelief:
     def weights_mean(self) -> Float[np.ndarray, " B"]:
         return frozen(np.bincount(self.origin, self.weights, minlength=len(self.drawn)) @ self.drawn)
 
-    @property
     def weights_factor(self) -> Float[np.ndarray, "N B"]:
         shares = np.bincount(self.origin, self.weights, minlength=len(self.drawn))
         return np.asarray(np.sqrt(shares)[:, None] * (self.drawn - self.weights_mean))

@@ -63,7 +63,6 @@ class PrompBelief:
         mean = means[0] if len(means) == 1 else self.timing.weights @ means
         return frozen(self.model.prior.mean + mean @ self.model.prior.factor)
 
-    @property
     def weights_factor(self) -> Float[np.ndarray, "N B"]:
         shares, means, covs = self.timing.weights, self.weights.means, self.weights.covs
         if len(means) == 1:

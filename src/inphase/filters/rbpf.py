@@ -93,7 +93,6 @@ class ParticleBelief:
     def weights_mean(self) -> Float[np.ndarray, " B"]:
         return frozen(self.model.prior.mean + self.weights @ self.means @ self.directions.rows)
 
-    @property
     def weights_factor(self) -> Float[np.ndarray, "N B"]:
         factor, directions = self.model.prior.factor, self.directions
         off = np.sqrt(self.weights)[:, None] * (self.means - self.weights @ self.means)

@@ -59,7 +59,7 @@ def weight_correlation(
 
 
 def _factor(model: Model, belief: Belief | None) -> Float[np.ndarray, "N B"]:
-    return model.prior.factor if belief is None else belief.weights_factor
+    return model.prior.factor if belief is None else belief.weights_factor()
 
 
 def _square(rows: Float[np.ndarray, "N M"]) -> Float[np.ndarray, "M M"]:
