@@ -9,7 +9,7 @@ from inphase.filters import Belief
 from inphase.filters.cloud import Cloud, cloud
 from inphase.result import Estimate
 
-NARROWEST = 0.004  # of the grid: points that all stand at one place are still to be seen
+NARROWEST = 0.8  # of the distance between two places on the grid: what is less wide could fall between them
 
 
 def cloud_of(moment: Belief | Estimate) -> Cloud:
@@ -59,7 +59,7 @@ def _width(
     shares, own = seen.weights, np.sqrt(seen.moving_var[:, column])
     spread = np.sqrt(max(float(shares @ (points - shares @ points) ** 2), 0.0))
     smoothing = 0.9 * spread * (1 / float(shares @ shares)) ** -0.2 if len(points) > 1 and not own.any() else 0.0
-    return np.asarray(np.maximum(own, max(smoothing, NARROWEST * float(np.ptp(grid)))))
+    return np.asarray(np.maximum(own, max(smoothing, NARROWEST * float(np.diff(grid).max()))))
 
 
 def _sum(

@@ -12,6 +12,7 @@ from inphase.filters import Belief
 from inphase.filters.cloud import Cloud, cloud
 from inphase.filters.resampling import systematic
 from inphase.model import Model
+from inphase.report.density import phase_density, tempo_density
 
 DIRECTIONS = 12  # at most, in which the weights are looked at
 VARIANCE = 0.99  # of the prior, that is enough
@@ -19,7 +20,6 @@ POINTS = 80  # of a cloud
 PHASES = 80  # and tempos, at which densities are told
 FASTEST = 3.0  # times the typical tempo, where the densities of tempos end
 STILL = 1e-20  # of the largest variance: a feature that is certain correlates with nothing
-NARROWEST = 0.6  # of the distance between two of these phases: a kernel less wide could fall between them
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,14 +86,10 @@ class Lens:
     def look(self, belief: Belief) -> Glimpse:
         """What the belief looks like from here."""
         seen = cloud(belief, self.directions)
-        phase, tempo = seen.moving.T
-        phase_var, tempo_var = seen.moving_var.T
-        if self.model.phase.periodic:
-            phase = phase % 1.0
         return Glimpse(
             _drawn(seen),
-            _density(phase, phase_var, seen.weights, self.phases),
-            _density(tempo, tempo_var, seen.weights, self.tempos),
+            phase_density(seen, self.phases, self.model.phase.periodic),
+            tempo_density(seen, self.tempos),
             seen.coordinate_moments[1],
         )
 
@@ -119,19 +115,3 @@ def _drawn(seen: Cloud) -> Float[np.ndarray, "N 2"]:
     draws = np.random.default_rng(0).standard_normal((POINTS, 2))
     moved = np.einsum("pij,pj->pi", np.broadcast_to(roots, (POINTS, 2, 2)), draws)
     return np.asarray(seen.coordinates[chosen, :2] + moved)
-
-
-def _density(
-    at: Float[np.ndarray, " P"],
-    var: Float[np.ndarray, " P"],
-    weights: Float[np.ndarray, " P"],
-    grid: Float[np.ndarray, " G"],
-) -> Float[np.ndarray, " G"]:
-    """The density of a mixture; points get a kernel by Silverman's rule."""
-    kernel = 0.0
-    if len(at) > 1:
-        spread = float(np.sqrt(max(weights @ (at - weights @ at) ** 2, 0.0)))
-        kernel = 0.9 * spread * (1 / (weights**2).sum()) ** -0.2
-    std = np.sqrt(var + max(kernel, NARROWEST * float(grid[1] - grid[0])) ** 2)
-    off = (grid[:, None] - at) / std
-    return np.asarray(np.exp(-0.5 * off**2) @ (weights / std) / np.sqrt(2 * np.pi))
