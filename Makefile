@@ -22,8 +22,9 @@ demo: $(VENV)/demo  ## learn from real handwriting, and follow a recording that 
 	$(BIN)/inphase demo $(ARGS)
 
 test: lint $(ROS1)  ## everything that must hold: lint, then the tests (make test ARGS="-k session")
-	@# As many files at a time as there are processors; of one file, tests share what they have set up.
-	$(BIN)/pytest -n logical --dist loadfile $(ARGS)
+	@# As many files at a time as there are processors, the slowest first (tests/conftest.py); of one file, tests share
+	@# what they have set up. Threads of BLAS beside them would only be in their way.
+	OMP_NUM_THREADS=1 $(BIN)/pytest -n logical --dist loadfile --no-loadscope-reorder $(ARGS)
 
 lint: $(VENV)/dev  ## style, types and arrows
 	$(BIN)/ruff check

@@ -431,16 +431,18 @@ def test_devices_that_do_not_stop_are_told_of_and_keep_no_other_from_it(model):
 
 
 def test_inside_a_run_there_is_one_thread_for_the_algebra(model):
-    from threadpoolctl import threadpool_info
+    import scipy.linalg  # noqa: F401 - it brings a BLAS of its own
+    from threadpoolctl import threadpool_info, threadpool_limits
 
     found: list[int] = []
     clock = FakeClock()
     look = Interrupting(SimulatedPartner(model), clock, [0.1], lambda: found.extend(_threads(threadpool_info())))
-    before = _threads(threadpool_info())
-    bench(model, sensors=[look], clock=clock).run(0.2)
-    assert found
+    with threadpool_limits(limits=2, user_api="blas"):  # wherever the tests run with one
+        before = _threads(threadpool_info())
+        bench(model, sensors=[look], clock=clock).run(0.2)
+        assert _threads(threadpool_info()) == before
+    assert set(before) == {2}
     assert set(found) == {1}
-    assert _threads(threadpool_info()) == before
 
 
 def _threads(pools) -> list[int]:
