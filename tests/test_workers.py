@@ -139,10 +139,19 @@ def blas() -> list[int]:
     return [found["num_threads"] for found in threadpoolctl.threadpool_info() if found["user_api"] == "blas"]
 
 
+def more_threads() -> None:
+    import scipy.linalg  # noqa: F401
+
+    threadpoolctl.threadpool_limits(limits=2, user_api="blas")
+
+
 def test_every_worker_has_one_blas_thread(cluster):
+    assert blas()  # what is loaded later would not be limited
     with threadpoolctl.threadpool_limits(limits=2, user_api="blas"):
         for place in places(cluster):
             with workers(**place) as team:
+                if place != {"jobs": 1}:
+                    team.run(more_threads, [()] * 4)  # whatever these processes were started with
                 for found in team.run(blas, [()] * 4):
                     assert set(found) == {1}
         assert set(blas()) == {2}
