@@ -50,6 +50,10 @@ def test_all_methods_equal_the_dense_matrix(bases: tuple[Basis, ...], seed: int)
     np.testing.assert_array_equal(slopes, layout.slope(phases, weights, features))
 
     rows, columns = rng.normal(size=(3, layout.size)), rng.normal(size=(len(chosen), 2))
+    told, across = layout.predict_and_project(phases, weights, rows, features)
+    np.testing.assert_array_equal(told, predicted)
+    np.testing.assert_array_equal(across, layout.project_each(phases, rows, features))
+    np.testing.assert_allclose(across, [rows @ matrix.T for matrix in matrices], atol=1e-12)
     root = rng.normal(size=(3, 3))
     var = [np.diag(matrix @ rows.T @ root @ root.T @ rows @ matrix.T) for matrix in matrices]
     np.testing.assert_allclose(layout.variance(phases, rows, root @ root.T, features), var, atol=1e-11)

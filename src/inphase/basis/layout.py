@@ -150,6 +150,22 @@ class Layout:
         shape = (len(phases), len(rows))
         return plan.join([p.reshape(*shape, b.count) for p, b in zip(parts, plan.blocks, strict=True)], shape)
 
+    def predict_and_project(
+        self,
+        phases: Float[np.ndarray, " P"],
+        weights: Float[np.ndarray, " B"],
+        rows: Float[np.ndarray, "N B"],
+        features: Int[np.ndarray, " M"] | None = None,
+    ) -> tuple[Float[np.ndarray, "P M"], Float[np.ndarray, "P N M"]]:
+        """(P, M) `predict` and (P, N, M) `project_each`, the bases evaluated once for both."""
+        plan, means, parts, shape = self._plan(features, weights), [], [], (len(phases), len(rows))
+        for block in plan.blocks:
+            values = block.basis(phases)
+            means.append(values @ block.weights(weights).T)
+            across = values @ block.weights(rows).reshape(-1, block.basis.size).T
+            parts.append(across.reshape(*shape, block.count))
+        return plan.join(means, phases.shape), plan.join(parts, shape)
+
     def variance(
         self,
         phases: Float[np.ndarray, " P"],

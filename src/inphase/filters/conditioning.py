@@ -66,8 +66,7 @@ def foresee(
 ) -> Foreseen | None:
     """The sample at each phase; None where S is no covariance, or the sample so far off that it is no reading."""
     features = observation.features
-    rows = model.layout.project_each(phases, model.prior.factor, features)
-    plain = model.layout.predict(phases, model.prior.mean, features)
+    plain, rows = model.layout.predict_and_project(phases, model.prior.mean, model.prior.factor, features)
     innovation = observation.values - plain - (weights.means[:, None] @ rows)[:, 0]
     cross = weights.covs @ rows
     cov = rows.transpose(0, 2, 1) @ cross + noise_cov

@@ -77,8 +77,8 @@ class PrompBelief:
         layout, prior = self.model.layout, self.model.prior
         phases = self.model.phase.confine(self._moving[self.timing.nodes, :1] * course.share + course.offset)
         flat = phases.reshape(-1)
-        rows = layout.project_each(flat, prior.factor, features).reshape(*phases.shape, -1, len(features))
-        plain = layout.predict(flat, prior.mean, features).reshape(*phases.shape, -1)
+        plain, rows = layout.predict_and_project(flat, prior.mean, prior.factor, features)
+        plain, rows = plain.reshape(*phases.shape, -1), rows.reshape(*phases.shape, -1, len(features))
         mean = plain + (self.weights.means[:, None, None] @ rows)[:, :, 0]
         var = np.maximum((rows * (self.weights.covs[:, None] @ rows)).sum(2), 0.0)
         return mixed(self.timing.node_weights, mean, var)

@@ -49,7 +49,7 @@ class Directions:
     def rest_at(self, phases: Float[np.ndarray, " P"], features: Int[np.ndarray, " M"]) -> Float[np.ndarray, "P M"]:
         """(P, M) the variance that is left over at each phase."""
         nearest = ((phases % 1.0 if phases.max() > 1 or phases.min() < 0 else phases) * (len(self.rest) - 1)).round()
-        return np.asarray(self.rest[nearest.astype(np.int64)][:, features])
+        return np.asarray(self.rest[nearest.astype(np.int64)[:, None], features])
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,19 +105,20 @@ class ParticleBelief:
         self, course: Course, features: Int[np.ndarray, " M"]
     ) -> tuple[Float[np.ndarray, "S M"], Float[np.ndarray, "S M"]]:
         most = max(LOOKED_AT // len(course.share), 20)
-        speaking = np.arange(len(self.weights))
-        weights = self.weights
+        weights, standing, means, covs = self.weights, self.motion.phase, self.means, self.covs
         if len(weights) > most:
-            order = np.argsort(self.motion.phase)  # so that those who speak stand where all of them stand
+            order = np.argsort(standing)  # so that those who speak stand where all of them stand
             speaking = order[systematic(weights[order], most, 0.5)]
-            weights = np.full(most, 1 / most)
-        confined = self.model.phase.confine(self.motion.phase[speaking, None] * course.share + course.offset)
+            weights, standing = np.full(most, 1 / most), standing[speaking]
+            means, covs = means[speaking], covs[speaking]
+        confined = self.model.phase.confine(standing[:, None] * course.share + course.offset)
         phases = confined.reshape(-1)
-        layout = self.model.layout
-        rows = layout.project_each(phases, self.directions.rows, features).reshape(*confined.shape, -1, len(features))
-        plain = layout.predict(phases, self.model.prior.mean, features).reshape(*confined.shape, -1)
-        mean = plain + (self.means[speaking][:, None, None] @ rows)[:, :, 0]
-        var = np.einsum("psrm,psrm->psm", rows, self.covs[speaking][:, None] @ rows)
+        plain, rows = self.model.layout.predict_and_project(
+            phases, self.model.prior.mean, self.directions.rows, features
+        )
+        plain, rows = plain.reshape(*confined.shape, -1), rows.reshape(*confined.shape, -1, len(features))
+        mean = plain + (means[:, None, None] @ rows)[:, :, 0]
+        var = np.einsum("psrm,psrm->psm", rows, covs[:, None] @ rows)
         var += self.directions.rest_at(phases, features).reshape(var.shape)
         return mixed(weights, mean, var)
 
@@ -181,8 +182,8 @@ class Rbpf:
         if len(observation) == 0:
             return belief, StepInfo()
         layout, phases, features = self.model.layout, belief.motion.phase, observation.features
-        rows = layout.project_each(phases, belief.directions.rows, features)  # Hᵀ, (P, R, M)
-        plain = layout.predict(phases, self.model.prior.mean, features)
+        # What the mean movement reads, and Hᵀ, (P, R, M).
+        plain, rows = layout.predict_and_project(phases, self.model.prior.mean, belief.directions.rows, features)
         # The variance that is not filtered lasts as long as the noise does, and is repeated as often.
         repeats = observation.noise_var / self.model.noise.var[features]
         noise_var = observation.noise_var + belief.directions.rest_at(phases, features) * repeats

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -41,7 +41,7 @@ class Motion:
 
     def tempo(self, phase: PhaseModel) -> Float[np.ndarray, " P"]:
         """(P,) the phase velocity [1/s]."""
-        return np.where(self.waiting, 0.0, phase.nominal_velocity * np.exp(self.own + self.momentary))
+        return _tempos(self.own, self.momentary, self.waiting, phase)
 
 
 def begin(
@@ -85,18 +85,21 @@ def advance(motion: Motion, phase: PhaseModel, tempo: Tempo, dt: float, rng: np.
 
 def _step(motion: Motion, phase: PhaseModel, tempo: Tempo, dt: float, rng: np.random.Generator) -> Motion:
     count, typical = len(motion.phase), phase.nominal_velocity * dt
-    rates = (tempo.change_rate, tempo.stretch_rate, tempo.stop_rate, tempo.go_rate)
-    changes, begins, stops, goes = (rng.random(count) < -np.expm1(-rate * typical) for rate in rates)
-    own = _mixed(count, tempo.usual, tempo.usual_std, tempo.other_std, rng)
+    rates = np.array([tempo.change_rate, tempo.stretch_rate, tempo.stop_rate, tempo.go_rate])
+    changes, begins, stops, goes = rng.random((4, count)) < -np.expm1(-rates * typical)[:, None]
+    own = np.where(changes, _mixed(count, tempo.usual, tempo.usual_std, tempo.other_std, rng), motion.own)
     momentary = _mixed(count, tempo.steady, tempo.momentary_std, tempo.other_std, rng)
-    moved = replace(
-        motion,
-        own=np.where(changes, own, motion.own),
-        momentary=np.where(begins, momentary, motion.momentary),
-        waiting=np.where(motion.waiting, ~goes, stops),
-    )
+    momentary = np.where(begins, momentary, motion.momentary)
+    waiting = np.where(motion.waiting, ~goes, stops)
     jitter = PHASE_JITTER * np.sqrt(typical) * rng.standard_normal(count)
-    return replace(moved, phase=phase.confine(motion.phase + moved.tempo(phase) * dt + jitter))
+    moved = phase.confine(motion.phase + _tempos(own, momentary, waiting, phase) * dt + jitter)
+    return Motion(moved, own, momentary, waiting)
+
+
+def _tempos(
+    own: Float[np.ndarray, " P"], momentary: Float[np.ndarray, " P"], waiting: Bool[np.ndarray, " P"], phase: PhaseModel
+) -> Float[np.ndarray, " P"]:
+    return np.where(waiting, 0.0, phase.nominal_velocity * np.exp(own + momentary))
 
 
 def _mixed(count: int, share: float, std: float, other_std: float, rng: np.random.Generator) -> Float[np.ndarray, " P"]:
