@@ -38,10 +38,13 @@ def shapes_unchecked() -> Iterator[None]:
 def taught(demos: inphase.Dataset, **options: Any) -> inphase.Model:
     """A model of all that is learned without playing held-out demonstrations, whose responses are the filter's own.
 
-    Its reflex is one of few moments: it has no weight, and to learn it well takes longer than all the rest.
+    Its reflex is one of few moments, and nothing of it is chosen: it has no weight, and to learn it well takes longer
+    than all the rest.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(learning, "MOMENTS", 2)
+        for name in ("SPEEDS", "WIDTHS", "TRENDS", "RIDGES"):
+            patch.setattr(learning, name, (1.0,))
         model = inphase.fit(demos, calibrate=False, **options)
     assert model.reflex is not None
     return replace(model, reflex=replace(model.reflex, weight=0.0))

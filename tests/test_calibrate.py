@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from interactions import dataset, taught
+from interactions import dataset, shapes_unchecked, taught
 from numpy.testing import assert_allclose, assert_array_equal
 
 import inphase
@@ -147,8 +147,9 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def calibrated(demos: inphase.Dataset) -> inphase.Model:
+    """The whole way, as users go it; its shapes are checked below, where a channel is known of one demonstration."""
     shares: list[float] = []
-    with pytest.MonkeyPatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch, shapes_unchecked():
         patch.setattr(rehearsal, "SAMPLES", 6)
         patch.setattr(rehearsal, "PARTICLES", 10)
         patch.setattr(rehearsal, "PLAYED", 3)
@@ -174,9 +175,9 @@ def test_a_fit_stores_what_it_chose_and_why(calibrated: inphase.Model) -> None:
 
 
 def test_what_is_given_is_not_chosen(demos: inphase.Dataset, calibrated: inphase.Model, short: None) -> None:
-    model = inphase.fit(
-        demos, noise=calibrated.noise, prior=calibrated.prior, tempo=inphase.tempo.Tempo(usual=0.6), shrinkage=0.0
-    )
+    given = {"noise": calibrated.noise, "prior": calibrated.prior, "tempo": inphase.tempo.Tempo(usual=0.6)}
+    with shapes_unchecked():
+        model = inphase.fit(demos, **given, shrinkage=0.0)
     assert model.evidence is not None
     assert {t.choice for t in model.evidence.trials} == {"before", "reflex", "band"}
     assert model.tempo.usual == 0.6

@@ -18,7 +18,7 @@ are -2 log densities: exp(-cost / 2) over the open ends is a distribution over t
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -164,4 +164,9 @@ class Alignment:
 
 def grid(phase: PhaseModel, count: int) -> Float[np.ndarray, " G"]:
     """(G,) `count` phases, evenly spaced from 0 to 1, or round the circle when the phase is periodic."""
-    return np.linspace(0.0, 1.0, count, endpoint=not phase.periodic)
+    return _grid(count, phase.periodic)
+
+
+@cache
+def _grid(count: int, periodic: bool) -> Float[np.ndarray, " G"]:
+    return frozen(np.linspace(0.0, 1.0, count, endpoint=not periodic))

@@ -38,8 +38,9 @@ def correlation_time(times: Float[np.ndarray, " T"], residuals: Float[np.ndarray
     count = seen.sum(0)
     power = np.maximum((filled**2).sum(0) / np.maximum(count, 1.0), np.finfo(float).tiny)
     alive, total, last = count > 0, np.zeros(len(count)), np.ones(len(count))
+    everything = bool(seen.all())
     for lag in range(1, len(filled)):
-        pairs = (seen[lag:] * seen[:-lag]).sum(0)
+        pairs = np.full(len(count), len(filled) - float(lag)) if everything else (seen[lag:] * seen[:-lag]).sum(0)
         product = (filled[lag:] * filled[:-lag]).sum(0) / np.maximum(pairs, 1.0) / power
         # The sum over all lags would weigh the few pairs at long lags as much as the many at short ones.
         last = np.where(pairs > 0, product * (1 - lag / len(filled)), last)
