@@ -289,7 +289,7 @@ def test_at_every_step_it_shows_what_python_says(step, one, told, played):
             [number(w) for w in told_words],
             [number(w) for w in words.split(" ± ")],
             rtol=0.06,
-            **{"atol": close["atol"]},
+            atol=close["atol"],
         )
     for kind, mean, std in (
         ("phase", estimate.phase, estimate.phase_std),

@@ -10,7 +10,7 @@ import numpy as np
 
 from inphase.metrics import NINETY
 from inphase.report.account import Account
-from inphase.report.lateness import lateness
+from inphase.report.lateness import Lateness, lateness, worst_stretch
 from inphase.report.spells import Spell, blind_stretches, pauses_of, status_spells, typical_tempo
 from inphase.result import Status
 
@@ -57,14 +57,46 @@ def _of_lateness(account: Account) -> Iterator[Finding]:
     late = lateness(account)
     if late is None:
         return
-    if not late.explains:
+    if late.explains:
+        yield Finding(
+            f"The response came {_how(late)}: moved by that, {_nearer(late.channels)}.", _worst(account), grave=True
+        )
+        return
+    stretch = worst_stretch(account)
+    if stretch is None:
         yield Finding("The response kept time: no shift in time would have brought it much nearer to what happened.")
         return
-    how = "late" if late.seconds > 0 else "early"
+    (start, end), late = stretch
     yield Finding(
-        f"The response came {abs(late.seconds):.2f} s {how}: moved by that, " + _nearer(late.channels),
-        _worst(account),
+        f"From {start - account.begin:.2f} to {end - account.begin:.2f} s the response came {_how(late)}: moved by "
+        f"that, {_nearer(late.channels)}. {_timing_between(account, start, end)}",
+        (start + end) / 2 - account.begin,
         grave=True,
+    )
+
+
+def _how(late: Lateness) -> str:
+    return f"{abs(late.seconds):.2f} s {'late' if late.seconds > 0 else 'early'}"
+
+
+def _timing_between(account: Account, start: float, end: float) -> str:
+    """What was believed of the timing then."""
+    own = [i for i, time in enumerate(account.times) if start <= time <= end]
+    estimates = [account.estimates[i] for i in own]
+    typical = typical_tempo(account)
+    if not estimates or typical <= 0:
+        return ""
+    slowest = min(estimates, key=lambda estimate: estimate.phase_velocity)
+    said = (
+        f"The tempo was believed to be {slowest.phase_velocity / typical:.2f} of the typical one at least, at "
+        f"{slowest.time - account.begin:.2f} s"
+    )
+    if len(account.progress) != len(account.estimates):
+        return f"{said}."
+    off = [account.estimates[i].phase - account.progress[i] for i in own]
+    at = max(range(len(off)), key=lambda i: abs(off[i]))
+    return (
+        f"{said}; the phase was {abs(off[at]):.2f} {'ahead of' if off[at] > 0 else 'behind'} the time that had passed."
     )
 
 
@@ -72,7 +104,7 @@ def _nearer(channels: Mapping[str, float]) -> str:
     """Which channels would have been how much nearer, those that gain most first."""
     gains = sorted(channels.items(), key=lambda item: item[1])
     told = ", ".join(f"{name} {100 * (1 - share):.0f} %" for name, share in gains[:MOST])
-    return f"the squared error would have been less: {told}."
+    return f"the squared error would have been less, of {told}"
 
 
 def _worst(account: Account) -> float | None:

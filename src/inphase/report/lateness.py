@@ -12,9 +12,12 @@ from inphase.channels import Role
 from inphase.metrics import difference
 from inphase.report.account import Account
 
-FARTHEST = 0.25  # of the run, that an answer may be late or early
-SHIFTS = 101
+FARTHEST = 0.15  # of the run, that an answer may be late or early
+SHIFTS = 61
 MOMENTS = 400  # at which answers are compared
+WINDOW, EVERY = 0.3, 0.1  # of the run: stretches that are looked at by themselves
+MOVES = 0.5  # of its deviation over the run: less in a stretch is resting
+EXACT = 0.03  # of a channel's spread: nearer than that is near enough, and nothing to explain
 WORTH = 0.8  # of the error as it is: a shift that leaves more of it explains nothing
 
 
@@ -33,7 +36,7 @@ class Lateness:
     @property
     def explains(self) -> bool:
         """Whether being late, or early, is much of what was wrong."""
-        return self.remains < WORTH and self.seconds != 0.0
+        return self.remains < WORTH and self.seconds != 0.0 and bool(self.channels)
 
 
 def lateness(account: Account, within: tuple[float, float] | None = None) -> Lateness | None:
@@ -43,27 +46,56 @@ def lateness(account: Account, within: tuple[float, float] | None = None) -> Lat
     error of a size of its own. Units do not matter, and a channel that is noise says nothing.
     """
     times, truth = account.times, account.truth
-    known = np.isfinite(account.now) & np.isfinite(truth)
-    moving = [k for k in range(truth.shape[1]) if known[:, k].sum() >= 2 and np.ptp(truth[known[:, k], k]) > 0]
-    if not moving or len(times) < 3 or times[-1] <= times[0]:
+    if len(times) < 3 or times[-1] <= times[0]:
         return None
-    channels = [c for c in account.recording.channels if c.role is Role.CONTROLLED]
     start, end = within or (times[0], times[-1])
+    moving = _moving(account, start, end)
+    if not moving or 2 * len(moving) < len(_moving(account, times[0], times[-1])):
+        return None  # most of it rests: what the others do is no measure of all
+    channels = [c for c in account.recording.channels if c.role is Role.CONTROLLED]
     moments = np.linspace(start, end, MOMENTS)
     answered = _course(account.now_times, account.now, moments)
     farthest = FARTHEST * (times[-1] - times[0])
     shifts = np.linspace(-farthest, farthest, SHIFTS)
     errors = np.empty((SHIFTS, len(moving)))
     for i, shift in enumerate(shifts.tolist()):
-        happened = _course(times, truth, moments - shift)
-        errors[i] = np.nanmean(difference(channels, answered, happened)[:, moving] ** 2, axis=0)
-    least = np.finfo(float).eps * np.nanvar(truth[:, moving], axis=0)
+        off = difference(channels, answered, _course(times, truth, moments - shift))[:, moving]
+        errors[i] = np.nanvar(off, axis=0)  # that it is off by as much all the time is not being late
+    least = EXACT**2 * np.nanvar(truth[:, moving], axis=0)
     logarithms = np.log(np.maximum(errors, least))
     gains = logarithms - logarithms[SHIFTS // 2]
     best = int(gains.mean(1).argmin())
     kept = np.exp(gains[best])
     nearer = {account.names[k]: float(share) for k, share in zip(moving, kept, strict=True) if share < WORTH}
     return Lateness(float(shifts[best]), float(np.exp(gains[best].mean())), nearer)
+
+
+def _moving(account: Account, start: float, end: float) -> list[int]:
+    """The controlled channels of which both what happened and the answers move between two times, as on the whole."""
+    times, truth = account.times, account.truth
+    found = []
+    for k, column in enumerate(truth.T):
+        known = np.isfinite(column) & np.isfinite(account.now[:, k])
+        then = known & (times >= start) & (times <= end)
+        courses = (column, account.now[:, k])
+        if then.sum() > 2 and all(course[then].std() > MOVES * course[known].std() > 0 for course in courses):
+            found.append(k)
+    return found
+
+
+def worst_stretch(account: Account) -> tuple[tuple[float, float], Lateness] | None:
+    """From when until when [s] being late or early explains most, and what it was then; None where it does nowhere."""
+    times = account.times
+    if len(times) < 3:
+        return None
+    length = float(times[-1] - times[0])
+    found = []
+    for start in np.arange(times[0], times[-1] - WINDOW * length + 1e-9, EVERY * length).tolist():
+        within = (start, start + WINDOW * length)
+        late = lateness(account, within)
+        if late is not None and late.explains:
+            found.append((within, late))
+    return min(found, key=lambda one: one[1].remains) if found else None
 
 
 def _course(
