@@ -36,7 +36,7 @@ function fill_table(table, head, rows) {
 function sampled(count, step) {
   const kept = new Set([Math.min(step, count - 1)]);
   for (let i = 0; i < ROWS; i++) kept.add(Math.round(i * (count - 1) / (ROWS - 1)));
-  return [...kept].filter(i => i >= 0).sort((a, b) => a - b);
+  return [...kept].filter(i => i >= 0 && i < count).sort((a, b) => a - b);
 }
 
 function event_rows(run) {
