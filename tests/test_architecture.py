@@ -24,7 +24,8 @@ SRC = ROOT / "src"
 BIN = Path(sys.executable).parent
 FILES = sorted(SRC.rglob("*.py"))
 CONTRACTS = {c["id"]: c for c in read_configuration(str(ROOT / "pyproject.toml"))["contracts_options"]}
-ABOVE = {"cli", "report", "runtime", "evaluation", "training", "workers", "replay"}  # io stands beside the session
+# Above the session; io stands beside it.
+ABOVE = {"cli", "studio", "report", "runtime", "evaluation", "training", "workers", "replay"}
 
 PUBLIC = [
     "Channel",

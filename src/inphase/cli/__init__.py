@@ -45,6 +45,7 @@ def _run(arguments: Sequence[str]) -> int:
     from inphase.cli.replay_run import is_of_run, replay_run
     from inphase.cli.report import report
     from inphase.cli.select import select
+    from inphase.cli.studio import studio
     from inphase.cli.validate import validate
 
     commands: dict[str, Callable[..., int]] = {
@@ -59,6 +60,7 @@ def _run(arguments: Sequence[str]) -> int:
         "bags": bags,
         "record": record,
         "live": live,
+        "studio": studio,
     }
     # The products of a filter are small: two threads make each slower, many times so on a busy machine.
     with threadpool_limits(limits=1):

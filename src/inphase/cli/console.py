@@ -11,6 +11,9 @@ from contextlib import contextmanager
 from rich.console import Console
 
 PATIENCE = 1.0  # [s] before a command that says nothing says what it does
+# Set to `plain`, what is being done is told on standard error as lines that a program reads: `doing learning from 8
+# demonstrations`, `progress 0.37`.
+PROGRESS = "INPHASE_PROGRESS"
 WIDE = 160  # columns where nobody looks: a row stays on its line, for those who search
 
 
@@ -39,7 +42,14 @@ def counted(number: int, thing: str) -> str:
 
 @contextmanager
 def waiting(what: str) -> Iterator[None]:
-    """Say on standard error, if that is a terminal, what is being done once it has taken more than a second."""
+    """Say on standard error, if that is a terminal, what is being done once it has taken more than a second.
+
+    For a program that watches: INPHASE_PROGRESS=plain.
+    """
+    if _watched():
+        _say(f"doing {what}")
+        yield
+        return
     console = Output(stderr=True)
     if not console.is_terminal:
         yield
@@ -57,7 +67,14 @@ def waiting(what: str) -> Iterator[None]:
 
 @contextmanager
 def working(what: str) -> Iterator[Callable[[float], None] | None]:
-    """A bar with the time that is left, on standard error if that is a terminal; to be told the share that is done."""
+    """A bar with the time that is left, on standard error if that is a terminal; to be told the share that is done.
+
+    For a program that watches: INPHASE_PROGRESS=plain.
+    """
+    if _watched():
+        _say(f"doing {what}")
+        yield lambda share: _say(f"progress {share:.3f}")
+        return
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Output(stderr=True)
@@ -68,3 +85,11 @@ def working(what: str) -> Iterator[Callable[[float], None] | None]:
     with Progress(*shown, console=console, transient=True) as bar:
         task = bar.add_task(what, total=1.0)
         yield lambda share: bar.update(task, completed=share)
+
+
+def _watched() -> bool:
+    return os.environ.get(PROGRESS) == "plain"
+
+
+def _say(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)

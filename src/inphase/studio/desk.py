@@ -1,0 +1,77 @@
+"""What the tabs of one page share: the folder, what is chosen, and who runs commands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from inphase.studio.command import Value
+from inphase.studio.folder import Contents, look
+from inphase.studio.worker import Worker
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is chosen; files are named from the studio's folder.
+
+    recordings: files and folders of recordings, as every command takes them. observed, controlled: channels of either
+    partner. angle, quaternion, linear: channels whose kind was said. model: a model file.
+    """
+
+    recordings: tuple[str, ...] = ()
+    observed: tuple[str, ...] = ()
+    controlled: tuple[str, ...] = ()
+    angle: tuple[str, ...] = ()
+    quaternion: tuple[str, ...] = ()
+    linear: tuple[str, ...] = ()
+    model: str = ""
+
+    @property
+    def columns(self) -> dict[str, Value]:
+        """The roles and kinds of channels, as options of a command."""
+        return {name: getattr(self, name) for name in ("observed", "controlled", "angle", "quaternion", "linear")}
+
+
+class Desk:
+    """What the tabs of one page share.
+
+    folder: the studio's, absolute. choice: what is chosen, replaced by `choose`. contents: what is in the folder,
+    looked through by `look`. worker: runs commands. pages: a folder whose files the page can show, at their
+    `address_of`.
+    """
+
+    def __init__(self, folder: Path, worker: Worker, pages: Path, address: str, choice: Choice | None = None) -> None:
+        self.folder, self.worker, self.pages = folder, worker, pages
+        self.choice = choice or Choice()
+        self.contents: Contents = look(folder)
+        self._address = address.rstrip("/")
+        self._listeners: list[tuple[frozenset[str], Callable[[], None]]] = []
+
+    def listen(self, what: str, told: Callable[[], None]) -> None:
+        """Have it called when one of these is another: fields of the choice, or `contents`; spaces between."""
+        self._listeners.append((frozenset(what.split()), told))
+
+    def choose(self, **changed: object) -> None:
+        """Choose something else, and tell those who listen."""
+        before, self.choice = self.choice, replace(self.choice, **changed)  # type: ignore[arg-type]
+        self._tell({name for name in changed if getattr(before, name) != getattr(self.choice, name)})
+
+    def look(self) -> None:
+        """Look through the folder once more, and tell those who listen where it holds something else."""
+        before, self.contents = self.contents, look(self.folder)
+        if before != self.contents:
+            self._tell({"contents"})
+
+    def path(self, name: str) -> Path:
+        """The file of that name, as the choice and the contents name it."""
+        return self.folder / name
+
+    def address_of(self, page: Path) -> str:
+        """Where the page is served, a file in `pages`."""
+        return f"{self._address}/{page.relative_to(self.pages).as_posix()}"
+
+    def _tell(self, changed: set[str]) -> None:
+        for what, told in list(self._listeners):
+            if what & changed:
+                told()
