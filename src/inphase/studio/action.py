@@ -13,7 +13,7 @@ from bokeh.models.widgets import Button, Div
 from inphase.errors import InphaseError
 from inphase.studio.command import Command
 from inphase.studio.desk import Desk
-from inphase.studio.text import as_html, text
+from inphase.studio.text import as_html, text, typed
 from inphase.studio.worker import Job, Outcome
 
 LAST = 60  # lines of what a command says that are shown
@@ -37,6 +37,7 @@ class Action:
         self._desk, self._build, self._done, self._with_output = desk, build, done, with_output
         self._command: Command | None = None
         self._job: Job | None = None
+        self._again = False
         self._line = Div(disable_math=True, css_classes=["command"], sizing_mode="stretch_width")
         self._copy = Button(label="Copy", css_classes=["copy"], width=70)
         self._start = Button(label=label, button_type="primary")
@@ -69,7 +70,7 @@ class Action:
             self._command = None
             self._line.text = as_html(error)
         else:
-            self._line.text = f"<code>{escape(self._command.shown)}</code>"
+            self._line.text = typed(self._command.shown)
             self._copy.js_event_callbacks = {}
             self._copy.js_on_click(CustomJS(code=f"navigator.clipboard.writeText({_as_js(self._command.shown)})"))
         self._copy.visible = self._command is not None
@@ -83,6 +84,14 @@ class Action:
         self._job = self._desk.worker.run(self._command, self._ended, self._progress)
         self._start.disabled, self._stop.visible = True, True
         self._progress(self._job)
+
+    def rerun(self) -> None:
+        """Run what is shown; what runs already is stopped first."""
+        if self._job is None:
+            self.run()
+        else:
+            self._again = True
+            self._job.stop()
 
     def stop(self) -> None:
         """Stop it, if it runs."""
@@ -99,10 +108,14 @@ class Action:
     def _ended(self, outcome: Outcome) -> None:
         self._job = None
         self._stop.visible = self._bar.visible = False
-        self.show(outcome)
+        again, self._again = self._again, False
         self._desk.look()
         self.refresh()
-        self._done(outcome)
+        if again:
+            self.run()
+        else:
+            self.show(outcome)
+            self._done(outcome)
 
     def show(self, outcome: Outcome) -> None:
         """Show how it ended."""

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from inphase.errors import DataError
+from inphase.io import Table, read_episode
+from inphase.io.files import episode_names
 from inphase.studio.command import Value
 from inphase.studio.folder import Contents, look
 from inphase.studio.worker import Worker
+
+KEPT = 3  # recordings that are read stay so
+PARTS = ("episodes", "models", "runs")
+READ = 5  # files that are tried for the names of channels
 
 
 @dataclass(frozen=True)
@@ -47,9 +55,42 @@ class Desk:
         self.contents: Contents = look(folder)
         self._address = address.rstrip("/")
         self._listeners: list[tuple[frozenset[str], Callable[[], None]]] = []
+        self._tables: dict[tuple[str, float], Table] = {}
+        if not set(self.choice.recordings) <= set(self.contents.episodes):
+            self.choice = replace(self.choice, recordings=())
+        if not self.choice.recordings:
+            self.choice = replace(self.choice, recordings=tuple(self.contents.episodes)[:1])
+        if self.choice.model not in self.contents.models:
+            self.choice = replace(self.choice, model=self.contents.models[0] if self.contents.models else "")
+
+    @property
+    def episodes(self) -> dict[str, str]:
+        """The files of the chosen recordings, by the names that every command has for them."""
+        files = [name for place in self.choice.recordings for name in self.contents.episodes.get(place, ())]
+        return dict(zip(episode_names([Path(name) for name in files]), files, strict=True))
+
+    def table(self, file: str) -> Table:
+        """What stands in a file of recordings; raises DataError. The last few are kept."""
+        path = self.folder / file
+        try:
+            key = (file, path.stat().st_mtime)
+        except OSError as error:
+            raise DataError(f"{file}: cannot be read: {error.strerror}") from None
+        if key not in self._tables:
+            while len(self._tables) >= KEPT:
+                del self._tables[next(iter(self._tables))]
+            self._tables[key] = read_episode(path)
+        return self._tables[key]
+
+    def names(self) -> tuple[str, ...]:
+        """The channels of the chosen recordings, as the first that can be read has them; none where none can."""
+        for file in list(self.episodes.values())[:READ]:
+            with suppress(DataError):
+                return self.table(file).columns
+        return ()
 
     def listen(self, what: str, told: Callable[[], None]) -> None:
-        """Have it called when one of these is another: fields of the choice, or `contents`; spaces between."""
+        """Have it called when one of these is another: fields of the choice or of the contents, spaces between."""
         self._listeners.append((frozenset(what.split()), told))
 
     def choose(self, **changed: object) -> None:
@@ -60,8 +101,7 @@ class Desk:
     def look(self) -> None:
         """Look through the folder once more, and tell those who listen where it holds something else."""
         before, self.contents = self.contents, look(self.folder)
-        if before != self.contents:
-            self._tell({"contents"})
+        self._tell({name for name in PARTS if getattr(before, name) != getattr(self.contents, name)})
 
     def path(self, name: str) -> Path:
         """The file of that name, as the choice and the contents name it."""

@@ -41,7 +41,7 @@ def look(folder: Path) -> Contents:
             break
         found += [here / name for name in files if not name.startswith(".")]
     episodes: dict[str, list[str]] = {}
-    for path in natural(path for path in found if path.suffix.lower() in SUFFIXES):
+    for path in natural(path for path in found if path.suffix.lower() in SUFFIXES and (folder / path).is_file()):
         episodes.setdefault(path.parent.as_posix(), []).append(path.as_posix())
     runs = [path for path in found if path.suffix == ".mcap"]
     return Contents(

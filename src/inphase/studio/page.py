@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from importlib.resources import files
 
+from bokeh.core.validation import silence
+from bokeh.core.validation.warnings import EMPTY_LAYOUT
 from bokeh.document import Document
 from bokeh.layouts import column
 from bokeh.themes import Theme
 
 from inphase.studio import data_tab, export_tab, live_tab, train_tab, try_tab
 from inphase.studio.desk import Desk
+
+silence(EMPTY_LAYOUT)  # what is drawn on demand is nothing before
 
 TABS = {"data": data_tab, "train": train_tab, "try": try_tab, "live": live_tab, "export": export_tab}
 INSIDE = files("inphase.studio")

@@ -19,9 +19,19 @@ def text(*paragraphs: object, kind: str = "") -> Div:
     )
 
 
+def heading(title: str) -> Div:
+    """The title of a part of the page."""
+    return Div(text=f"<h2>{escape(title)}</h2>", disable_math=True, css_classes=["said"], sizing_mode="stretch_width")
+
+
 def as_html(*paragraphs: object) -> str:
     """Paragraphs for the `text` of a Div, of which nothing is taken for markup."""
     return "".join(f"<p>{escape(str(paragraph))}</p>" for paragraph in paragraphs)
+
+
+def typed(line: str) -> str:
+    """A command line for the `text` of a Div, broken between its words alone."""
+    return "<code>" + " ".join(f"<span>{escape(word)}</span>" for word in line.split(" ")) + "</code>"
 
 
 def plain(name: str) -> Any:

@@ -10,7 +10,9 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
+from inphase.errors import InphaseError
 from inphase.studio.command import Command
 
 MOST = 64_000_000  # characters that are kept of what a command prints
@@ -19,6 +21,7 @@ GRACE = 3.0  # [s] from asking a command to stop until it is told, and from tell
 CHUNK = 65536
 
 Call = Callable[[], None]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -171,6 +174,23 @@ class Worker:
         job.over = True
         self.jobs.remove(job)
         self._tell(lambda: done(outcome))
+
+    def think(self, work: Callable[[], T], done: Callable[[T], None], failed: Callable[[InphaseError], None]) -> None:
+        """Have something worked out in a thread, which touches nothing of the page; done and failed: told what came."""
+        task = asyncio.get_running_loop().create_task(self._think(work, done, failed))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _think(
+        self, work: Callable[[], T], done: Callable[[T], None], failed: Callable[[InphaseError], None]
+    ) -> None:
+        try:
+            found = await asyncio.to_thread(work)
+        except InphaseError as error:
+            refused = error
+            self._tell(lambda: failed(refused))
+        else:
+            self._tell(lambda: done(found))
 
     def _tell(self, call: Call) -> None:
         self._bring(call)
