@@ -76,6 +76,11 @@ class Action:
         self._copy.visible = self._command is not None
         self._start.disabled = self._command is None or self._job is not None
 
+    @property
+    def running(self) -> bool:
+        """Whether it runs now."""
+        return self._job is not None
+
     def run(self) -> None:
         """Run what is shown."""
         if self._command is None or self._job is not None:

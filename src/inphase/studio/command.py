@@ -24,13 +24,14 @@ class Command:
     def of(cls, name: str, *positional: str, options: Mapping[str, Value] | None = None) -> Command:
         """`inphase name positional… --option value…`.
 
-        options: by their long names, with dashes. None, False and no values leave an option out; True is a flag.
+        options: by their names, without the dashes before them. None, False and no values leave one out; True is a
+        flag.
         """
         arguments = [name, *(as_path(part) for part in positional)]
         for option, value in (options or {}).items():
             if value is None or value is False or (isinstance(value, Sequence) and not len(value)):
                 continue
-            arguments.append(f"--{option}")
+            arguments.append(f"--{option}" if len(option) > 1 else f"-{option}")
             if value is not True:
                 several = not isinstance(value, str) and isinstance(value, Sequence)
                 arguments += map(str, value) if several else [str(value)]  # type: ignore[arg-type]

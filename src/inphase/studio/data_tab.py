@@ -110,7 +110,10 @@ class DataTab:
     def _noted(self, outcome: Outcome) -> None:
         """A decision was noted, and what is left was looked at."""
         self._looked(outcome)
-        self._look.show(outcome)
+        if self._look.running:  # it has begun before, and would tell what no longer holds
+            self._look.rerun()
+        else:
+            self._look.show(outcome)
 
     def _show(self) -> None:
         self._episodes.show()

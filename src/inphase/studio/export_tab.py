@@ -10,7 +10,7 @@ from pathlib import Path
 
 from bokeh.layouts import column, row
 from bokeh.models import LayoutDOM
-from bokeh.models.widgets import Button, Checkbox, Div, Select, TextInput
+from bokeh.models.widgets import Button, CheckboxGroup, Div, Select, TextInput
 
 from inphase.errors import InphaseError, OptionError
 from inphase.io import whole_file
@@ -35,7 +35,7 @@ class ExportTab:
         self._target = TextInput(
             title="Save as (from the folder, or a whole path)", value="export.inphase", sizing_mode="stretch_width"
         )
-        self._over = Checkbox(label="in the place of a file that is there", active=False)
+        self._over = CheckboxGroup(labels=["in the place of a file that is there"], active=[])
         self._line = Div(disable_math=True, css_classes=["command"], sizing_mode="stretch_width")
         self._save = Button(label="Save", button_type="primary")
         self._said = text()
@@ -91,7 +91,7 @@ class ExportTab:
     def _copy(self) -> None:
         try:
             target = save_copy(
-                self._desk.folder, self._desk.choice.model, self._target.value_input.strip(), self._over.active
+                self._desk.folder, self._desk.choice.model, self._target.value_input.strip(), bool(self._over.active)
             )
         except (InphaseError, OSError) as error:
             self._said.text, self._said.css_classes = as_html(error), ["said", "error"]

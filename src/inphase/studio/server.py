@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import logging
 import os
 import secrets
 import signal
@@ -52,6 +53,7 @@ class Studio:
     def __init__(self, folder: Path, port: int = 0) -> None:
         for name in [name for name in os.environ if name.startswith("BOKEH_")]:
             del os.environ[name]  # they may open it to others, or have the page load its scripts from elsewhere
+        logging.getLogger("bokeh").setLevel(logging.ERROR)  # that a page was closed is no news
         self.folder = folder.resolve()
         self._token = secrets.token_urlsafe(24)
         self._choice = Choice()

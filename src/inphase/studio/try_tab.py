@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
+import secrets
 from html import escape
+from pathlib import Path
 
 from bokeh.layouts import column, row
 from bokeh.models import LayoutDOM
@@ -28,8 +29,8 @@ class TryTab:
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
-        self._numbers = itertools.count(1)
-        self._page = desk.pages / "none"
+        self._shown: Path | None = None
+        self._page = self._new_page()
         self._model = Select(title="Model", sizing_mode="stretch_width")
         self._episode = Select(title="Episode", sizing_mode="stretch_width")
         self._filters = CheckboxButtonGroup(labels=list(FILTERS), active=[list(FILTERS).index(RECOMMENDED)])
@@ -86,8 +87,8 @@ class TryTab:
         self._no_runs.visible = not runs
         self._open.refresh()
 
-    def _next_page(self) -> str:
-        return str(self._desk.pages / f"report-{id(self)}-{next(self._numbers)}.html")
+    def _new_page(self) -> Path:
+        return self._desk.pages / f"report-{secrets.token_hex(4)}.html"
 
     def _played(self) -> Command:
         if not self._model.value:
@@ -97,21 +98,22 @@ class TryTab:
         filters = [list(FILTERS)[i] for i in sorted(self._filters.active)]
         if not filters:
             raise OptionError("choose a filter, or several")
-        options: dict[str, Value] = {"filter": filters, "seed": int(self._seed.value or 0), "o": self._next_page()}
+        options: dict[str, Value] = {"filter": filters, "seed": int(self._seed.value or 0), "o": str(self._page)}
         return Command.of("report", str(self._model.value), str(self._episode.value), options=options)
 
     def _reported(self) -> Command:
         if not self._runs.value:
             raise OptionError("choose a run, or several")
-        return Command.of("report", *self._runs.value, options={"o": self._next_page()})
+        return Command.of("report", *self._runs.value, options={"o": str(self._page)})
 
     def _show(self, outcome: Outcome) -> None:
         """The page that was written, which can reach nothing of the studio."""
-        page = self._desk.pages / outcome.command.arguments[-1]
+        page = Path(outcome.command.arguments[-1])
         if not (outcome.fine and page.is_file()):
             return
-        self._page.unlink(missing_ok=True)
-        self._page = page
+        if self._shown is not None:
+            self._shown.unlink(missing_ok=True)
+        self._shown, self._page = page, self._new_page()
         address = escape(self._desk.address_of(page), quote=True)
         self._report.text = (
             f'<p><a href="{address}" target="_blank" rel="noopener">open it in a tab of its own</a></p>'

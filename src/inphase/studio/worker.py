@@ -19,6 +19,7 @@ MOST = 64_000_000  # characters that are kept of what a command prints
 SHOWN = 200_000  # of what it says on standard error
 GRACE = 3.0  # [s] from asking a command to stop until it is told, and from telling until it is killed
 CHUNK = 65536
+FRAME = "╭╮╰╯─│ "
 
 Call = Callable[[], None]
 T = TypeVar("T")
@@ -46,8 +47,12 @@ class Outcome:
             return "stopped"
         if self.fine:
             return ""
-        lines = [line.strip() for line in self.said.splitlines() if line.strip()]
-        return lines[-1] if lines else f"ended with exit code {self.code}"
+        lines = [line.strip(FRAME) for line in self.said.splitlines() if line.strip(FRAME)]
+        if not lines:
+            return f"ended with exit code {self.code}"
+        told = [line for line in lines if line.startswith("inphase: ")]
+        # A mistake in options stands first, in a frame; what a program did not expect stands last.
+        return told[-1] if told else lines[-1 if "Traceback" in self.said else 0]
 
 
 class Job:
@@ -91,7 +96,7 @@ class Job:
         self._process = process = await asyncio.create_subprocess_exec(
             *self.command.run_as,
             cwd=folder,
-            env={**os.environ, "INPHASE_PROGRESS": "plain", "PYTHONUNBUFFERED": "1", "PYTHONIOENCODING": "utf-8"},
+            env=_environment(),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -130,6 +135,14 @@ class Job:
                 self.share = min(max(float(line[len("progress ") :]), 0.0), 1.0)
             return ""
         return line + "\n"
+
+
+def _environment() -> dict[str, str]:
+    """Of a command: it runs elsewhere, and still is the inphase that runs here."""
+    told = {"INPHASE_PROGRESS": "plain", "PYTHONUNBUFFERED": "1", "PYTHONIOENCODING": "utf-8"}
+    if places := os.environ.get("PYTHONPATH"):
+        told["PYTHONPATH"] = os.pathsep.join(os.path.abspath(place) for place in places.split(os.pathsep))
+    return {**os.environ, **told}
 
 
 async def _all(stream: asyncio.StreamReader) -> str:

@@ -38,7 +38,7 @@ def draw_episode(
 
     cut: from when until when [s] it is used, None for as far as it goes.
     """
-    figure = new_figure(title, "time [s]", height=200, tools="xpan,xwheel_zoom,reset")
+    figure = new_figure(title, "time [s]", height=190, tools="xpan,xwheel_zoom,reset")
     times, values = table.times, table.pick(names)
     lines: list[LegendItem] = []
     for i, name in enumerate(names):
@@ -60,7 +60,8 @@ def draw_episode(
         figure.add_layout(BoxAnnotation(right=cut[0], **off))
     if cut[1] is not None:
         figure.add_layout(BoxAnnotation(left=cut[1], **off))
-    figure.add_layout(_legend(lines), "below")
+    if len(lines) > 1 or not title.startswith(names[0]):
+        figure.add_layout(_legend(lines), "below")
     return figure
 
 
