@@ -48,7 +48,7 @@ class Action:
         self._start.on_click(self.run)
         self._stop.on_click(self.stop)
         self.layout = column(
-            row(self._line, self._copy, sizing_mode="stretch_width"),
+            row(self._copy, self._line, sizing_mode="stretch_width"),
             row(self._start, self._stop),
             self._bar,
             self._outcome,
@@ -100,6 +100,7 @@ class Action:
 
     def stop(self) -> None:
         """Stop it, if it runs."""
+        self._again = False
         if self._job is not None:
             self._job.stop()
 

@@ -6,12 +6,14 @@ from bokeh.layouts import column, row
 from bokeh.models import LayoutDOM
 from bokeh.models.widgets import Select
 
+from inphase.io.notes import NOTES
 from inphase.studio.action import Action
 from inphase.studio.command import Command
 from inphase.studio.data_channels import Channels
 from inphase.studio.data_episodes import Episodes
 from inphase.studio.data_overlay import OverlayPanel
 from inphase.studio.desk import Desk
+from inphase.studio.memory import Key
 from inphase.studio.quality import Quality
 from inphase.studio.text import heading, text
 from inphase.studio.worker import Outcome
@@ -29,6 +31,7 @@ class DataTab:
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
+        self._state: Key | None = None
         self._quality = Quality(desk)
         self._source = Select(title="Recordings", sizing_mode="stretch_width")
         self._nothing = text(kind="quiet")
@@ -99,18 +102,39 @@ class DataTab:
         self._quality.read("")
         self._show()
         self._look.refresh()
-        if self._desk.episodes:
+        if not self._desk.episodes:
+            return
+        self._state = self._key()
+        known = self._desk.memory.get(self._state)
+        if known is None:
             self._look.rerun()
+        else:
+            self._look.stop()
+            self._told(known, True)
+
+    def _key(self) -> Key:
+        """What the look goes by: the command, the recordings, and the notes beside them."""
+        notes = [f"{place}/{NOTES}" for place in self._desk.choice.recordings]
+        files = [self._desk.path(file) for file in [*self._desk.episodes.values(), *notes]]
+        return self._desk.memory.key(self._command(), files)
 
     def _looked(self, outcome: Outcome) -> None:
-        self._quality.read(outcome.output)
+        if outcome.stopped:
+            return
+        if outcome.fine and self._state == self._key():  # nothing has changed meanwhile
+            self._desk.memory.keep(self._state, outcome.output)
+        self._told(outcome.output, outcome.fine)
+
+    def _told(self, output: str, fine: bool) -> None:
+        self._quality.read(output)
         self._show()
-        self._overlay.update(outcome.fine)
+        self._overlay.update(fine)
 
     def _noted(self, outcome: Outcome) -> None:
         """A decision was noted, and what is left was looked at."""
-        self._looked(outcome)
+        self._told(outcome.output, outcome.fine)
         if self._look.running:  # it has begun before, and would tell what no longer holds
+            self._state = self._key()
             self._look.rerun()
         else:
             self._look.show(outcome)

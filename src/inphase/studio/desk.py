@@ -12,6 +12,7 @@ from inphase.io import Table, read_episode
 from inphase.io.files import episode_names
 from inphase.studio.command import Value
 from inphase.studio.folder import Contents, look
+from inphase.studio.memory import Memory
 from inphase.studio.worker import Worker
 
 KEPT = 3  # recordings that are read stay so
@@ -46,12 +47,21 @@ class Desk:
 
     folder: the studio's, absolute. choice: what is chosen, replaced by `choose`. contents: what is in the folder,
     looked through by `look`. worker: runs commands. pages: a folder whose files the page can show, at their
-    `address_of`.
+    `address_of`. memory: what was found out of recordings, for when the page is loaded again.
     """
 
-    def __init__(self, folder: Path, worker: Worker, pages: Path, address: str, choice: Choice | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        worker: Worker,
+        pages: Path,
+        address: str,
+        choice: Choice | None = None,
+        memory: Memory | None = None,
+    ) -> None:
         self.folder, self.worker, self.pages = folder, worker, pages
         self.choice = choice or Choice()
+        self.memory = memory if memory is not None else Memory()
         self.contents: Contents = look(folder)
         self._address = address.rstrip("/")
         self._listeners: list[tuple[frozenset[str], Callable[[], None]]] = []

@@ -28,6 +28,7 @@ from tornado.web import OutputTransform, StaticFileHandler
 
 from inphase.errors import OptionError
 from inphase.studio.desk import Choice, Desk
+from inphase.studio.memory import Memory
 from inphase.studio.page import fill
 from inphase.studio.worker import Worker
 
@@ -56,7 +57,7 @@ class Studio:
         logging.getLogger("bokeh").setLevel(logging.ERROR)  # that a page was closed is no news
         self.folder = folder.resolve()
         self._token = secrets.token_urlsafe(24)
-        self._choice = Choice()
+        self._choice, self._memory = Choice(), Memory()
         self._workers: list[Worker] = []
         self._exits = ExitStack()
         try:
@@ -110,7 +111,7 @@ class Studio:
 
     def _fill(self, document: Document) -> None:
         worker = Worker(self.folder, document.add_next_tick_callback)
-        desk = Desk(self.folder, worker, self._pages, f"/{self._token}/pages", self._choice)
+        desk = Desk(self.folder, worker, self._pages, f"/{self._token}/pages", self._choice, self._memory)
         self._workers.append(worker)
 
         def remember() -> None:

@@ -13,6 +13,7 @@ from jaxtyping import Float
 from inphase.channels import group_of
 from inphase.io import Table
 from inphase.preprocess.checks.clock import GAP
+from inphase.studio.figures.extent import extent
 from inphase.studio.figures.look import FAINT, LEGEND, LINES, new_figure, short
 
 COLOURS = ("#2b86b3", "#d2691e", "#5d9a3c", "#9a62c7", "#c2446b", "#a07c1f")
@@ -38,14 +39,19 @@ def draw_episode(
 
     cut: from when until when [s] it is used, None for as far as it goes.
     """
-    figure = new_figure(title, "time [s]", height=190, tools="xpan,xwheel_zoom,reset")
     times, values = table.times, table.pick(names)
+    if not np.isfinite(values).any():
+        title += ": nothing was seen"
+    figure = new_figure(title, "time [s]", height=190, tools="xpan,xwheel_zoom,reset")
+    figure.x_range, figure.y_range = extent([times], margin=0.02), extent([values])
     lines: list[LegendItem] = []
     for i, name in enumerate(names):
         at = thinned(times, values[:, i])
         drawn_times, drawn = broken(times, values[:, i], at)
         colour, dash = COLOURS[i % len(COLOURS)], LINES[i // 3 % len(LINES)]
         line = figure.line(drawn_times, drawn, color=colour, line_width=1.6, line_dash=dash)
+        alone = isolated(drawn)
+        figure.scatter(drawn_times[alone], drawn[alone], color=colour, size=3)
         lines.append(LegendItem(label={"value": short(name)}, renderers=[line]))  # type: ignore[list-item]
     for start, end in gaps(times)[:MARKED]:
         figure.add_layout(BoxAnnotation(left=start, right=end, fill_color=FAINT, fill_alpha=0.25, line_color=None))
@@ -101,6 +107,12 @@ def thinned(times: Float[np.ndarray, " T"], values: Float[np.ndarray, " T"]) -> 
         if len(missing) < len(part):
             kept += [int(part[np.nanargmin(here)]), int(part[np.nanargmax(here)])]
     return np.unique(kept)
+
+
+def isolated(values: Float[np.ndarray, " S"]) -> np.ndarray:
+    """Which readings have none beside them, so that no line shows them."""
+    seen = np.concatenate([[False], np.isfinite(values), [False]])
+    return np.flatnonzero(seen[1:-1] & ~seen[:-2] & ~seen[2:])
 
 
 def broken(

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from bokeh.models import ColumnDataSource, HoverTool
+from bokeh.models import ColumnDataSource, HoverTool, Range1d
 from bokeh.plotting import figure as Figure
 from jaxtyping import Float
 
 from inphase.basis import Gaussian, Layout
 from inphase.basis.fit import fit_weights
 from inphase.preprocess.coordinates import Coordinates
+from inphase.studio.figures.extent import extent
 from inphase.studio.figures.look import FAINT, LEGEND, MARK, MEAN, labelled, new_figure, tips
 from inphase.trajectory import Dataset
 
@@ -82,7 +83,7 @@ def draw_overlay(overlay: Overlay, feature: int, chosen: int | None, size: int) 
         figure.legend.border_line_color, figure.legend.label_text_font_size = None, "11px"
         figure.legend.label_text_color = LEGEND
         figure.add_layout(figure.legend[0], "below")
-    figure.x_range.update(start=0, end=1)
+    figure.x_range, figure.y_range = Range1d(start=0, end=1), extent(curve[:, feature] for curve in overlay.curves)
     return figure
 
 
