@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -10,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 from browser import watched
@@ -32,8 +34,11 @@ def write(
 
 
 @contextmanager
-def studio(folder: Path, **environment: str) -> Iterator[str]:
-    """The address of a studio that runs, and that ends well: asked to, it has nothing to complain of."""
+def studio(folder: Path, says: str = "", **environment: str) -> Iterator[str]:
+    """The address of a studio that runs, and that ends well.
+
+    says: what is on its standard error, a regular expression; of its secret there is nothing.
+    """
     command = [sys.executable, "-m", "inphase.cli", "studio", str(folder)]
     process = subprocess.Popen(
         command,
@@ -46,10 +51,13 @@ def studio(folder: Path, **environment: str) -> Iterator[str]:
     try:
         assert process.stdout is not None
         process.stdout.readline()
-        yield process.stdout.readline().strip()
+        address = process.stdout.readline().strip()
+        yield address
         process.send_signal(signal.SIGINT)
         output, said = process.communicate(timeout=60)
-        assert (process.returncode, output, said) == (0, "studio ended\n", "")
+        assert (process.returncode, output) == (0, "studio ended\n"), said
+        assert re.fullmatch(says, said), said
+        assert urlsplit(address).path.strip("/") not in said
     finally:
         process.kill()
         process.communicate()

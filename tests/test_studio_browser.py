@@ -113,6 +113,7 @@ def test_an_episode_is_left_out_and_taken_back(browser, address, folder):
 def test_an_episode_is_cut_and_roles_are_said(browser, address, folder):
     with opened(browser, address) as page:
         data = recordings(page, "roles", 3)
+        expect(data.get_by_label("Drawn").locator("option")).to_have_text(["hand", "robot"])
         observed, controlled = (data.get_by_label(f"{role}: names or patterns") for role in ("Observed", "Controlled"))
         observed.fill("hand_?")
         observed.press("Enter")

@@ -9,6 +9,7 @@ import tyro
 
 from inphase.cli.console import Output
 from inphase.errors import OptionError
+from inphase.studio import forget_settings
 
 Flag = Annotated[bool, tyro.conf.arg(help_behavior_hint="")]
 
@@ -32,6 +33,7 @@ def studio(
         raise OptionError(f"{folder}: no such folder")
     if not 0 <= port < 65536:
         raise OptionError(f"--port: expected 0 to 65535, got {port}")
+    forget_settings()
     try:
         import bokeh  # noqa: F401
     except ImportError:

@@ -38,6 +38,7 @@ class Episodes:
     def __init__(self, desk: Desk, quality: Quality, noted: Callable[[Outcome], None]) -> None:
         self._desk, self._quality = desk, quality
         self.listeners: list[Callable[[], None]] = []
+        self._file: str | None = None  # of the chosen one
         self.list = make_table(
             {
                 "name": ("episode", 130, None),
@@ -94,6 +95,8 @@ class Episodes:
             self._chosen.options = names  # type: ignore[assignment]
         if self.chosen not in names:
             self._chosen.value = names[0] if names else ""
+        elif self._file != self._desk.episodes[self.chosen]:  # of other recordings, by the same name
+            self._choose()
         else:
             self._say()
         self._note.refresh()
@@ -105,6 +108,7 @@ class Episodes:
 
     def _choose(self) -> None:
         names = list(self._desk.episodes)
+        self._file = self._desk.episodes.get(self.chosen)
         if self.chosen in names:
             self._rows.selected.indices = [names.index(self.chosen)]
         table = self._table()

@@ -15,7 +15,7 @@ from inphase.studio.data_overlay import OverlayPanel
 from inphase.studio.desk import Desk
 from inphase.studio.memory import Key
 from inphase.studio.quality import Quality
-from inphase.studio.text import heading, text
+from inphase.studio.text import as_html, heading, text
 from inphase.studio.worker import Outcome
 
 ALL = "*"  # no folder is called so
@@ -142,7 +142,7 @@ class DataTab:
     def _show(self) -> None:
         self._episodes.show()
         self._channels.show()
-        self._summary.text = text(*(part for part in (self._quality.error, *self._quality.summary) if part)).text
+        self._summary.text = as_html(*self._quality.summary)
 
 
 def _named(place: str) -> str:

@@ -15,12 +15,11 @@ COLUMNS = ("name", "seconds", "rate", "gap", "missing", "far", "said")
 
 
 class Quality:
-    """Of the chosen recordings: told by `inspect`, empty until then. error: why notes cannot be used."""
+    """Of the chosen recordings: told by `inspect`, empty until then."""
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
         self._told: Mapping[str, Any] = {}
-        self.error = ""
 
     def read(self, output: str) -> None:
         """Take over what `inphase inspect --json` printed; what is no such thing says nothing."""
@@ -55,13 +54,11 @@ class Quality:
         return [*lines, f"{len(outliers)} {are} unlike the others: further off than {told['threshold']:.3g}"]
 
     def notes(self) -> dict[str, Note]:
-        """What was decided of each episode."""
+        """What was decided of each episode; nothing where the notes cannot be used."""
         episodes = self._desk.episodes
-        self.error = ""
         try:
             return dict(zip(episodes, notes_for([self._desk.path(file) for file in episodes.values()]), strict=True))
-        except DataError as error:
-            self.error = str(error)
+        except DataError:  # `inspect` says so
             return dict.fromkeys(episodes, Note())
 
     def table(self) -> dict[str, list[Any]]:

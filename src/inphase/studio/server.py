@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import logging
-import os
 import secrets
 import signal
 import tempfile
@@ -52,11 +51,9 @@ class Studio:
     """A server of the page of one folder, to be used as a context; raises OptionError where its port is taken."""
 
     def __init__(self, folder: Path, port: int = 0) -> None:
-        for name in [name for name in os.environ if name.startswith("BOKEH_")]:
-            del os.environ[name]  # they may open it to others, or have the page load its scripts from elsewhere
-        logging.getLogger("bokeh").setLevel(logging.ERROR)  # that a page was closed is no news
         self.folder = folder.resolve()
         self._token = secrets.token_urlsafe(24)
+        _log_without(self._token)
         self._choice, self._memory = Choice(), Memory()
         self._workers: list[Worker] = []
         self._exits = ExitStack()
@@ -95,7 +92,7 @@ class Studio:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         for worker in self._workers:
-            worker.kill()
+            self._loop.asyncio_loop.run_until_complete(worker.closed())  # type: ignore[attr-defined]
         self._server.unlisten()
         self._server.stop()
         self._exits.close()
@@ -118,12 +115,27 @@ class Studio:
             self._choice = desk.choice  # for when the page is loaded again
 
         def forget(context: Any) -> None:
-            worker.kill()
+            worker.close()
             self._workers.remove(worker)
 
         desk.listen(" ".join(Choice.__dataclass_fields__), remember)
         document.on_session_destroyed(forget)
         fill(document, desk)
+
+
+def _log_without(secret: str) -> None:
+    """What goes wrong in the server is printed on standard error, less the secret."""
+
+    class Discreet(logging.Formatter):
+        def format(self, record: logging.LogRecord) -> str:
+            return super().format(record).replace(secret, "…")
+
+    handler = logging.StreamHandler()
+    handler.setFormatter(Discreet("%(levelname)s: %(message)s"))
+    for name in ("bokeh", "tornado"):
+        logger = logging.getLogger(name)
+        logger.handlers, logger.propagate = [handler], False
+        logger.setLevel(logging.ERROR)  # that a page was closed is no news
 
 
 class _Web(BokehTornado):

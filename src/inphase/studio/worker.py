@@ -17,7 +17,7 @@ from inphase.studio.command import Command
 
 MOST = 64_000_000  # characters that are kept of what a command prints
 SHOWN = 200_000  # of what it says on standard error
-GRACE = 3.0  # [s] from asking a command to stop until it is told, and from telling until it is killed
+GRACE = 8.0  # [s] from asking a command to stop until it is told, and from telling until it is killed
 CHUNK = 65536
 FRAME = "╭╮╰╯─│ "
 
@@ -208,7 +208,14 @@ class Worker:
     def _tell(self, call: Call) -> None:
         self._bring(call)
 
-    def kill(self) -> None:
-        """End all that runs, at once."""
+    def close(self) -> None:
+        """End all that runs, at once, and tell nobody any more."""
+        self._bring = lambda call: None
         for job in self.jobs:
             job.kill()
+
+    async def closed(self) -> None:
+        """Close it, and wait until nothing runs: what was only being started ends too."""
+        self.close()
+        if self._tasks:
+            await asyncio.wait(self._tasks, timeout=GRACE)
