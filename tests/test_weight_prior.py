@@ -57,6 +57,25 @@ def test_the_factor_squared_is_the_sample_covariance(count: int, size: int, seed
     np.testing.assert_allclose(prior.mean, rows.mean(0))
 
 
+@given(COUNTS, SIZES, SEEDS, SHARES, SHARES)
+def test_few_rows_have_the_covariance_of_every_feature_alone(
+    count: int, size: int, seed: int, shrinkage: float, trust: float
+) -> None:
+    rows, blocks = samples(count, size, seed), cut(size, seed)
+    partner = int(np.cumsum((0, *blocks))[seed % (len(blocks) + 1)])
+    prior = WeightPrior(rows, shrinkage, trust, partner, blocks)
+    own = within(blocks)
+    assert len(prior.alone) == count
+    assert in_proportion(prior.alone.T @ prior.alone, sample_cov(rows))[own].max() < 1e-9
+    assert in_proportion(prior.cov, sample_cov(rows))[own].max() < 1e-8
+
+
+def test_a_partner_who_ends_within_a_feature_takes_all_rows() -> None:
+    rows = samples(5, 6, 0)
+    for prior in (WeightPrior(rows, 0.3, 0.5, 2, (3, 3)), WeightPrior(rows, 0.3, 0.5, 3)):
+        np.testing.assert_array_equal(prior.alone, prior.factor)
+
+
 @given(COUNTS, SIZES, SEEDS)
 def test_there_are_fewer_directions_than_demonstrations(count: int, size: int, seed: int) -> None:
     assert len(WeightPrior(samples(count, size, seed)).factor) <= min(count - 1, size)

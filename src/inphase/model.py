@@ -137,7 +137,9 @@ class Model:
     def distribution(self, phases: ArrayLike) -> tuple[Float[np.ndarray, "P D"], Float[np.ndarray, "P D"]]:
         """Mean and standard deviation (P, D) of the channels over new interactions, at phases (P,)."""
         at, everything = self._phases(phases), np.arange(self.layout.count)
-        var = (self.layout.project_each(at, self.prior.factor, everything) ** 2).sum(1)
+        by_feature = self.prior.blocks == tuple(basis.size for basis in self.layout.bases)
+        rows = self.prior.alone if by_feature else self.prior.factor
+        var = (self.layout.project_each(at, rows, everything) ** 2).sum(1)
         mean, var = self.to_channels(self.layout.predict(at, self.prior.mean), var + self.noise.var)
         return frozen(mean), frozen(np.sqrt(var))
 

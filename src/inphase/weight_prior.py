@@ -80,6 +80,16 @@ class WeightPrior:
             rows = np.concatenate([rows[~both], shared, np.sqrt(1 - self.trust**2) * alone])
         return frozen(_reduced(rows))
 
+    @property
+    def alone(self) -> Float[np.ndarray, "R B"]:
+        """(R, B) rows whose square is Σ_ww within each block, though not between blocks.
+
+        Few of them whatever shrinks: `factor` has some for every feature then, and takes a minute for 500 of them.
+        """
+        ends = np.cumsum(self.blocks)
+        # Neither shrinkage nor a lack of trust changes what is within a block, if the partner ends with one.
+        return self._spread if self.partner in (0, *ends) and len(ends) else self.factor
+
     @cached_property
     def _spread(self) -> Float[np.ndarray, "N B"]:
         """(N, B) the demonstrations around their mean: rows whose square is the sample covariance."""
