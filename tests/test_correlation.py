@@ -150,6 +150,16 @@ def test_the_weights_of_some_channels_by_name(model):
         weight_correlation(model, channels="nobody")
 
 
+@pytest.mark.parametrize(
+    ("shrinkage", "trust", "partner"), [(0.3, 0.6, 9), (1.0, 1.0, 9), (0.2, 0.0, 5), (0.3, 0.6, 7)]
+)
+def test_the_weights_of_some_channels_are_believed_as_those_of_all(model, shrinkage, trust, partner):
+    prior = WeightPrior(model.prior.samples, shrinkage, trust, partner, (5, 4, 5, 4))
+    _, got = weight_correlation(believed(prior, model), channels=["lift", "turn"])
+    places, std = [5, 6, 7, 8, 14, 15, 16, 17], np.sqrt(prior.cov.diagonal())
+    assert_allclose(got, (prior.cov / np.outer(std, std))[np.ix_(places, places)], atol=1e-9)
+
+
 def test_a_channel_that_never_varies_correlates_with_itself_alone(model):
     samples = model.prior.samples.copy()
     samples[:, 5:9] = 0.3

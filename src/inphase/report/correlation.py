@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
@@ -51,7 +52,13 @@ def weight_correlation(
     features = model.coordinates.features_of(match(channels, model.names))
     slices = [model.layout.slices[i] for i in features]
     places = np.concatenate([np.arange(part.start, part.stop) for part in slices])
-    cov = _square(_factor(model, belief)[:, places])
+    if belief is None and _by_block(model):
+        # The prior of these features alone: to the factor of all, a shrunk one has some rows for every feature.
+        prior, sizes = model.prior, tuple(part.stop - part.start for part in slices)
+        partner = int((places < prior.partner).sum())
+        cov = replace(prior, samples=prior.samples[:, places], partner=partner, blocks=sizes).cov
+    else:
+        cov = _square(_factor(model, belief)[:, places])
     names = [
         f"{model.coordinates.names[i]} {number + 1}" for i in features for number in range(model.layout.bases[i].size)
     ]
