@@ -114,11 +114,13 @@ def _movements(model: Model, channels: list[int], left_out: str) -> list[LayoutD
 
 
 def _correlations(model: Model, channels: list[int], left_out: str) -> list[LayoutDOM]:
+    trust = model.prior.trust
     return [
         heading("Correlations"),
         text(
             "Over the whole interaction: filled where two channels go together, hollow where they go against each "
             "other; the area is how strongly. Tap a square, or choose two channels, to see their basis weights.",
+            *([f"Between the partners they are believed to {100 * trust:.0f} %."] if trust < 1 else []),
             *([f"Shown: {left_out}."] if left_out else []),
             kind="quiet",
         ),
@@ -161,8 +163,8 @@ def _calibration(model: Model) -> list[LayoutDOM]:
             f"{before.nll:.3g} → {after.nll:.3g}; playing the mean by the clock: error {evidence.by_the_clock:.3g}."
         ),
         text(
-            f"{evidence.held_out} demonstrations were held out, each played to a model that had not seen it, in "
-            f"{len(evidence.conditions)} ways: {', '.join(evidence.conditions)}. Filled: what the model has; dashed "
+            f"{evidence.held_out} demonstrations were held out, and each was played to a model that had not seen it: "
+            f"{', '.join(evidence.conditions)}. Filled: what the model has; dashed "
             "lines: before and after; dotted: 90 %, and the error of playing by the clock.",
             kind="quiet",
         ),
