@@ -10,6 +10,7 @@ from inphase.io.intprim_analysis import read_analysis
 from inphase.io.intprim_analysis_writer import AnalysisHead, AnalysisStep, write_analysis
 from inphase.io.intprim_model import OldModel, read_bip
 from inphase.io.load import load, pick_roles, read_episode
+from inphase.io.mcap_follow import Follower, News, follow_recording
 from inphase.io.mcap_recording import read_recorded_model, read_recording
 from inphase.io.notes import Note, read_notes
 from inphase.io.table import Table
@@ -17,11 +18,14 @@ from inphase.io.table import Table
 __all__ = [
     "AnalysisHead",
     "AnalysisStep",
+    "Follower",
+    "News",
     "Note",
     "OldModel",
     "Table",
     "edit_notes",
     "find_episodes",
+    "follow_recording",
     "load",
     "pick_roles",
     "read_analysis",

@@ -49,6 +49,9 @@ def schema(topic: str) -> bytes:
 # ------------------------------------------------------------------------------------------------------- description
 
 
+Described = tuple[str, tuple[Channel, ...], dict[str, str]]  # name, channels and provenance
+
+
 def describe_run(name: str, channels: Sequence[Channel], provenance: Mapping[str, str]) -> dict[str, str]:
     """What the metadata record says: texts by name, with a checksum, as MCAP has none for it."""
     described = {
@@ -60,7 +63,7 @@ def describe_run(name: str, channels: Sequence[Channel], provenance: Mapping[str
     return {**described, "sha256": _checksum(described)}
 
 
-def described_run(described: Mapping[str, str]) -> tuple[str, tuple[Channel, ...], dict[str, str]]:
+def described_run(described: Mapping[str, str]) -> Described:
     """Name, channels and provenance from a metadata record; raises DataError and what a wrong entry raises."""
     if _checksum(described) != described.get("sha256"):
         raise DataError("damaged: the checksum of the description differs from the one it names")

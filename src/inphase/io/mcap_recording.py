@@ -3,41 +3,20 @@
 from __future__ import annotations
 
 import io
-import json
-import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
-
-import numpy as np
+from typing import TypeVar
 
 from inphase.errors import DataError, InphaseError, ModelFileError
-from inphase.io.mcap_messages import (
-    COMMAND,
-    DESCRIPTION,
-    ESTIMATE,
-    EVENT,
-    MODEL,
-    OBSERVATION,
-    RESPONSE,
-    described_run,
-    read_command,
-    read_estimate,
-    read_event,
-    read_observation,
-    read_response,
-)
+from inphase.io.mcap_messages import DESCRIPTION, MODEL, described_run
+from inphase.io.mcap_records import MAGIC, Records
+from inphase.io.mcap_run import Gathered
 from inphase.io.model_file import checksum_named, model_of_bytes
 from inphase.model import Model
-from inphase.recording import RecordedCommand, RecordedEvent, Recording
-from inphase.result import Estimate, Response
+from inphase.recording import Recording
 
-if TYPE_CHECKING:
-    from mcap.records import McapRecord
-
-COMPRESSED = ("zstd", "lz4")
-MAGIC = b"\x89MCAP0\r\n"
+UNREADABLE = (ValueError, LookupError, TypeError, AttributeError, OverflowError, RecursionError)  # of a wrong message
 T = TypeVar("T")
 
 
@@ -68,70 +47,44 @@ def _read(path: Path, parse: Callable[[bytes, str], T]) -> T:
         raise DataError(f"{path}: cannot be read: {error.strerror}") from None
     except InphaseError as error:
         raise DataError(f"{path}: {error}") from None
-    except (ValueError, LookupError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+    except UNREADABLE as error:
         raise DataError(f"{path}: its content is not that of a recording: {error!r}") from None
 
 
 def _recording(content: bytes, stem: str) -> Recording:
-    from mcap.records import Channel, Message, Metadata
-
-    described, damage = None, ""
-    index: dict[str, int] = {}
-    topics: dict[int, str] = {}
-    samples, estimates, responses = [], list[Estimate](), list[Response | None]()
-    commands, events = list[RecordedCommand](), list[RecordedEvent]()
-    for record in _records(content):
-        if isinstance(record, str):
-            damage = record
-        elif isinstance(record, Metadata) and record.name == DESCRIPTION:
-            described = described_run(record.metadata)
-            index = {channel.name: i for i, channel in enumerate(described[1])}
-        elif isinstance(record, Channel):
-            topics[record.id] = record.topic
-        elif isinstance(record, Message) and described is not None:
-            topic = topics.get(record.channel_id)
-            if topic == OBSERVATION:
-                samples.append(read_observation(json.loads(record.data), index))
-            elif topic == ESTIMATE:
-                estimates.append(read_estimate(json.loads(record.data)))
-                responses.append(None)
-            elif topic == RESPONSE and responses:
-                responses[-1] = read_response(json.loads(record.data))
-            elif topic == COMMAND:
-                commands.append(read_command(json.loads(record.data)))
-            elif topic == EVENT:
-                events.append(read_event(json.loads(record.data)))
-    if described is None:
+    records, gathered = Records(), Gathered()
+    for record in records.take(io.BytesIO(content), len(content)):
+        gathered.take(record)
+    damage = _damage(records, content)
+    if gathered.described is None:
         raise DataError(_foreign(damage))
-    name, channels, provenance = described
+    name, channels, provenance = gathered.described
     return Recording(
         name or stem,
         channels,
-        np.array([time for time, _ in samples], dtype=np.float64),
-        np.array([values for _, values in samples], dtype=np.float64).reshape(len(samples), len(channels)),
-        tuple(estimates),
-        tuple(responses),
+        gathered.times,
+        gathered.values,
+        tuple(gathered.estimates),
+        tuple(gathered.responses.get(i) for i in range(gathered.count)),
         {**provenance, "damage": damage} if damage else provenance,
-        tuple(commands),
-        tuple(events),
+        tuple(gathered.commands),
+        tuple(gathered.events),
     )
 
 
 def _recorded_model(content: bytes, stem: str) -> Model | None:
     from mcap.records import Attachment, Metadata
 
-    described, attached, damage = None, None, ""
-    for record in _records(content):
-        if isinstance(record, str):
-            damage = record
-        elif isinstance(record, Metadata) and record.name == DESCRIPTION:
+    records, described, attached = Records(), None, None
+    for record in records.take(io.BytesIO(content), len(content)):
+        if isinstance(record, Metadata) and record.name == DESCRIPTION:
             described = described_run(record.metadata)
         elif isinstance(record, Attachment) and record.name == MODEL:
             attached = record.data
         if described is not None and attached is not None:
             break
     if described is None:
-        raise DataError(_foreign(damage))
+        raise DataError(_foreign(_damage(records, content)))
     if attached is None:
         return None
     named, got = described[2].get("model", ""), checksum_named(attached)
@@ -144,32 +97,10 @@ def _foreign(damage: str) -> str:
     return f"expected a recording of inphase, got an MCAP file that tells of none{damage and ': '}{damage}"
 
 
-def _records(content: bytes) -> Iterator[McapRecord | str]:
-    """All records up to the end of the data or the first damage; then a text that says which."""
-    from mcap.exceptions import McapError
-    from mcap.records import Chunk, DataEnd
-    from mcap.stream_reader import StreamReader, breakup_chunk
-
-    if content[: len(MAGIC)] != MAGIC:
-        raise DataError(f"expected an MCAP file, which begins with {MAGIC!r}, got {content[: len(MAGIC)]!r}")
-    stream = io.BytesIO(content)  # not the file: a size that is not true would be asked of memory before it is read
-    compressed = ""
-    records = StreamReader(stream, emit_chunks=True, record_size_limit=len(content)).records
-    whole = 0
-    try:
-        for record in records:
-            if isinstance(record, Chunk):
-                if record.compression in COMPRESSED:  # little may unpack to more than there is memory
-                    compressed = record.compression
-                    break
-                yield from breakup_chunk(record, validate_crc=True)
-            else:
-                yield record
-            if isinstance(record, DataEnd):
-                return
-            whole = stream.tell()
-    except (McapError, struct.error, ValueError, OverflowError) as error:
-        ends = stream.tell() >= len(content)
-        yield f"{'cut short' if ends else 'damaged'} after byte {whole} of {len(content)}: {error or 'it ends there'}"
-    if compressed:
-        raise DataError(f"expected chunks that are not compressed, got {compressed}: `mcap decompress` unpacks them")
+def _damage(records: Records, content: bytes) -> str:
+    """Why there is no more in a file; empty where it came to its end."""
+    if not records.offset:
+        raise DataError(f"expected an MCAP file, which begins with {MAGIC!r}, got {content!r}")
+    if records.ended or records.damage:
+        return records.damage
+    return f"cut short after byte {records.offset} of {len(content)}: it ends there"
