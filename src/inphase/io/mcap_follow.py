@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
+import stat
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from os import PathLike
@@ -16,13 +18,13 @@ from inphase.arrays import freeze
 from inphase.channels import Channel
 from inphase.errors import InphaseError
 from inphase.io.mcap_recording import UNREADABLE
-from inphase.io.mcap_records import Records, last_time
+from inphase.io.mcap_records import MAGIC, Records, last_time
 from inphase.io.mcap_run import Gathered
 from inphase.recording import RecordedCommand, RecordedEvent
 from inphase.result import Estimate, Response
 
 AT_ONCE = 4 * 2**20  # bytes
-TAIL = 64  # bytes before the offset, by which a file that was written anew is known
+TAIL = 64  # bytes before what comes next, by which a file that was written over is known
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +33,7 @@ class News:
 
     anew: the file is another than before: forget what it told. times: (T,) [s]. values: (T, D) of all channels, NaN
     where one was not seen; both are read-only. responses: by the number of the estimate that each stands beside,
-    counted from the first that was taken of this file.
+    counted from the first of the file.
     """
 
     times: Float[np.ndarray, " T"]
@@ -49,10 +51,18 @@ class News:
 def follow_recording(path: str | PathLike[str], *, last: float | None = None) -> Follower:
     """A follower of the recording there, which need not be there yet.
 
-    last: pass over what ended more than so many seconds before the newest chunk when the file is first looked at (but
-    for the first chunk, which names the topics); all is taken unless told.
+    last: of what is more than so many seconds older than the newest message when the file is first looked at, events
+    alone are told [s]; all of it unless given.
     """
     return Follower(Path(path), last)
+
+
+def has_end(path: Path) -> bool:
+    """Whether a recording was closed, by its last bytes alone; raises OSError where it cannot be read."""
+    with _opened(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        file.seek(max(size - len(MAGIC), 0))
+        return size > len(MAGIC) and file.read(len(MAGIC)) == MAGIC
 
 
 class Follower:
@@ -76,10 +86,10 @@ class Follower:
         self.trouble = ""
         self.size = 0  # [bytes] of the file when it was last looked at
         self._broken = False
-        self._since = 0  # [ns]: chunks that end before are passed over
+        self._since = 0  # [ns]
         self._records, self._gathered = Records(), Gathered()
         self._file: tuple[int, int] | None = None
-        self._tail = b""
+        self._seen = b""
 
     @property
     def there(self) -> bool:
@@ -119,7 +129,7 @@ class Follower:
         """
         anew = False
         try:
-            with self.path.open("rb") as file:
+            with _opened(self.path) as file:
                 found = os.fstat(file.fileno())
                 if self._is_another(file, found):
                     anew = True
@@ -132,16 +142,15 @@ class Follower:
                     self._take(file, at_most)
         except FileNotFoundError:
             anew = self.there
-            if anew:
-                self._forget()
+            self._forget()
         except OSError as error:  # it may go away
             self.trouble = f"{self.path}: cannot be read: {error.strerror or error}"
         return self._told(anew)
 
     def _take(self, file: io.BufferedIOBase, at_most: int) -> None:
         try:
-            for record in self._records.take(file, self.size, self._since, at_most):
-                self._gathered.take(record)
+            for record in self._records.take(file, self.size, at_most):
+                self._gathered.take(record, self._since)
         except InphaseError as error:
             self._break(str(error))
         except UNREADABLE as error:
@@ -150,9 +159,8 @@ class Follower:
             self._break(self._records.damage)
         elif self.ended and self._gathered.described is None:
             self._break("expected a recording of inphase, got an MCAP file that tells of none")
-        begin = max(self._records.offset - TAIL, 0)
-        file.seek(begin)
-        self._tail = file.read(self._records.offset - begin)
+        file.seek(max(self._records.offset - TAIL, 0))
+        self._seen = file.read(self._known - file.tell())
 
     def _break(self, why: str) -> None:
         self.trouble, self._broken = f"{self.path}: {why}", True
@@ -163,8 +171,13 @@ class Follower:
             return False
         if self._file != (found.st_dev, found.st_ino) or found.st_size < self._records.offset:
             return True
-        file.seek(self._records.offset - len(self._tail))
-        return file.read(len(self._tail)) != self._tail
+        file.seek(max(self._records.offset - TAIL, 0))
+        return file.read(len(self._seen)) != self._seen
+
+    @property
+    def _known(self) -> int:
+        """Up to where the file can be no other without being another: what was taken, and how what is wrong begins."""
+        return self._records.offset + (TAIL if self._broken else 0)
 
     def _told(self, anew: bool) -> News:
         told = self._gathered
@@ -179,3 +192,10 @@ class Follower:
         )
         told.clear()
         return news
+
+
+def _opened(path: Path) -> io.BufferedReader:
+    """To be read; raises OSError for what is no file, as a pipe, which would be waited for."""
+    if not stat.S_ISREG(path.stat().st_mode):
+        raise OSError(errno.EINVAL, "it is no file")
+    return path.open("rb")

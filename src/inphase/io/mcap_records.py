@@ -22,7 +22,7 @@ CHUNK = 0x06
 class Records:
     """Takes whole records from where it was the last time on; one that is not whole yet waits.
 
-    offset: all bytes before it have been taken, or passed over. ended: whether the data came to its end. damage: what
+    offset: all bytes before it have been taken. ended: whether the data came to its end. damage: what
     is wrong with the record at the offset, after which nothing more is taken; empty while all is well.
     """
 
@@ -30,16 +30,12 @@ class Records:
         self.offset = 0
         self.ended = False
         self.damage = ""
-        self._begun = False  # whether a chunk was taken
 
-    def take(
-        self, stream: io.BufferedIOBase, size: int, since: int = 0, at_most: int | None = None
-    ) -> Iterator[McapRecord]:
+    def take(self, stream: io.BufferedIOBase, size: int, at_most: int | None = None) -> Iterator[McapRecord]:
         """What there is in a stream of that many bytes; chunks broken up.
 
-        since: all chunks but the first, which names the topics, that end before are passed over [ns]. at_most: bytes,
-        after which the rest is left, by whole records. Nothing that a record says of its length makes more memory be
-        asked for than there are bytes. Raises DataError for what is no MCAP file, or compressed.
+        at_most: bytes, after which the rest is left, by whole records. Nothing that a record says of its length makes
+        more memory be asked for than there are bytes. Raises DataError for what is no MCAP file, or compressed.
         """
         from mcap.exceptions import McapError
         from mcap.records import Chunk, DataEnd
@@ -59,10 +55,7 @@ class Records:
             found = _head(stream, self.offset, size)
             if found is None:
                 return
-            kind, end = found
-            if self._begun and kind == CHUNK and _last_time(stream, self.offset) < since:
-                self.offset = end
-                continue
+            _, end = found
             stream.seek(self.offset)
             content = stream.read(end - self.offset)
             if len(content) < end - self.offset:  # it became shorter meanwhile
@@ -79,7 +72,7 @@ class Records:
                 self.damage = f"damaged after byte {self.offset} of {size}: {error or 'a record ends too early'}"
                 return
             self.offset = end
-            self.ended, self._begun = isinstance(record, DataEnd), self._begun or chunk is not None
+            self.ended = isinstance(record, DataEnd)
             yield from (record for record in records if record is not None)
         if packed:
             raise DataError(f"expected chunks that are not compressed, got {packed}: `mcap decompress` unpacks them")
@@ -91,7 +84,9 @@ def last_time(stream: io.BufferedIOBase, size: int) -> int:
     while (found := _head(stream, offset, size)) is not None:
         kind, end = found
         if kind == CHUNK:
-            last = max(last, _last_time(stream, offset))
+            stream.seek(offset + HEAD.size)
+            span = stream.read(SPAN.size)
+            last = max(last, SPAN.unpack(span)[1]) if len(span) == SPAN.size else last
         offset = end
     return last
 
@@ -107,10 +102,3 @@ def _head(stream: io.BufferedIOBase, offset: int, size: int) -> tuple[int, int] 
     kind, length = HEAD.unpack(head)
     end = offset + HEAD.size + length
     return (kind, end) if end <= size else None
-
-
-def _last_time(stream: io.BufferedIOBase, offset: int) -> int:
-    """When the last message of the chunk there is [ns]; never, of one that is too short to say."""
-    stream.seek(offset + HEAD.size)
-    span = stream.read(SPAN.size)
-    return int(SPAN.unpack(span)[1]) if len(span) == SPAN.size else 2**64

@@ -71,8 +71,11 @@ class Gathered:
         rows = [values for _, values in self._samples]
         return np.array(rows, dtype=np.float64).reshape(len(rows), len(self.channels))
 
-    def take(self, record: McapRecord) -> None:
-        """One more; raises DataError, or what a wrong entry raises, for a message that cannot be read."""
+    def take(self, record: McapRecord, since: int = 0) -> None:
+        """One more; raises DataError, or what a wrong entry raises, for a message that cannot be read.
+
+        since: of messages before that time [ns], events alone are read, and estimates counted.
+        """
         from mcap.records import Channel as Topic
         from mcap.records import Message, Metadata
 
@@ -82,7 +85,11 @@ class Gathered:
         elif isinstance(record, Topic):
             self._topics[record.id] = record.topic
         elif isinstance(record, Message) and self.described is not None:
-            self._tell(self._topics.get(record.channel_id, ""), record.data)
+            topic = self._topics.get(record.channel_id, "")
+            if record.log_time >= since or topic == EVENT:
+                self._tell(topic, record.data)
+            elif topic == ESTIMATE:
+                self.count += 1
 
     def _tell(self, topic: str, data: bytes) -> None:
         if topic == OBSERVATION:
