@@ -48,6 +48,7 @@ class Desk:
     folder: the studio's, absolute. choice: what is chosen, replaced by `choose`. contents: what is in the folder,
     looked through by `look`. worker: runs commands. pages: a folder whose files the page can show, at their
     `address_of`. memory: what was found out of recordings, for when the page is loaded again.
+    every: has a function called every so many milliseconds, for as long as the page is there.
     """
 
     def __init__(
@@ -58,8 +59,9 @@ class Desk:
         address: str,
         choice: Choice | None = None,
         memory: Memory | None = None,
+        every: Callable[[Callable[[], None], int], object] = lambda call, milliseconds: None,
     ) -> None:
-        self.folder, self.worker, self.pages = folder, worker, pages
+        self.folder, self.worker, self.pages, self.every = folder, worker, pages, every
         self.choice = choice or Choice()
         self.memory = memory if memory is not None else Memory()
         self.contents: Contents = look(folder)

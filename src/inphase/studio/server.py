@@ -108,7 +108,8 @@ class Studio:
 
     def _fill(self, document: Document) -> None:
         worker = Worker(self.folder, document.add_next_tick_callback)
-        desk = Desk(self.folder, worker, self._pages, f"/{self._token}/pages", self._choice, self._memory)
+        address, every = f"/{self._token}/pages", document.add_periodic_callback
+        desk = Desk(self.folder, worker, self._pages, address, self._choice, self._memory, every)
         self._workers.append(worker)
 
         def remember() -> None:
