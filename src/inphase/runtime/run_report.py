@@ -44,6 +44,14 @@ class RunReport:
         content["lag"] = None if self.lag != self.lag else self.lag
         return json.dumps(content)
 
+    @classmethod
+    def of_json(cls, content: str) -> RunReport:
+        """The report that `as_json` wrote; raises what a wrong entry raises."""
+        told = json.loads(content)
+        told["timings"] = {stage: Spread(**spread) for stage, spread in told["timings"].items()}
+        told["lag"] = float("nan") if told["lag"] is None else float(told["lag"])
+        return cls(**told)
+
     @property
     def lines(self) -> list[str]:
         """All of it, for a person."""
