@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from inphase.runtime.replay import provenance_of
 from interactions import CONTROLLED, OBSERVED, chance_model, phase_model, shapes_unchecked
 from rigs import bench, learned
 
@@ -22,6 +21,7 @@ from inphase import DataError, Estimate, Response, Status
 from inphase.channels import make_channels
 from inphase.io import Follower, News, follow_recording, read_recording
 from inphase.recording import RecordedCommand, RecordedEvent
+from inphase.runtime import provenance_of
 from inphase.runtime.recorder import Recorder
 
 CHANNELS = make_channels(OBSERVED, CONTROLLED, units={"reach": "m"})
@@ -186,6 +186,7 @@ def test_of_a_long_run_only_the_last_seconds_are_taken_and_all_events(tmp_path: 
 
 @given(at=st.integers(0, 10**9), byte=st.integers(0, 255), cut=st.integers(0, 10**9))
 @example(at=9, byte=255, cut=10**9)  # a length that is not true
+@example(at=16, byte=127, cut=10**9)  # one that no memory holds
 @settings(max_examples=40)
 def test_of_a_damaged_file_as_much_is_told_as_can_be_read(
     at: int, byte: int, cut: int, content: bytes, scratch: Path
