@@ -70,7 +70,7 @@ class LiveTab:
         self._drawn = [ChannelFigure(times) for _ in range(DRAWN)]
         self._page = self._new_page()
         self._report = Action(desk, "Make its report", self._report_command, self._made, with_output=False)
-        self._shown = Div(disable_math=True, visible=False, sizing_mode="stretch_width", css_classes=["report"])
+        self._shown = Div(disable_math=True, sizing_mode="stretch_width", css_classes=["report"])
         self._plots = column(
             *(each.figure for each in self._estimates),
             self._channels,
@@ -140,7 +140,7 @@ class LiveTab:
         self._name, self._window = name, LiveWindow(seconds)
         self._follower = follow_recording(self._desk.path(name), last=seconds)
         self._attach.label = "Detach"
-        self._shown.visible = self._after.visible = False
+        self._shown.text, self._after.visible = "", False
         self._all.visible = True
         self._report.refresh()
         self._look()
@@ -239,7 +239,6 @@ class LiveTab:
             f'<p><a href="{address}" target="_blank" rel="noopener">open it in a tab of its own</a></p>'
             f'<iframe src="{address}" title="report" sandbox="allow-scripts allow-downloads"></iframe>'
         )
-        self._shown.visible = True
         self._report.refresh()
 
     def _new_page(self) -> Path:

@@ -25,9 +25,11 @@ def time_range(seconds: float) -> Range1d:
 
 
 def move(times: Range1d, window: LiveWindow) -> None:
-    """Have the newest sample stand where it stood."""
-    now, ahead = max(window.now, window.seconds * 0.2), AHEAD * window.seconds
-    times.start, times.end = max(now - window.seconds, -0.02 * window.seconds), now + ahead
+    """Have the newest sample stand where it stood, and nothing beyond it once the run has ended."""
+    now, ahead = window.now, AHEAD * window.seconds
+    if window.report is not None:
+        ahead = 0.02 * min(now, window.seconds)
+    times.start, times.end = max(now - window.seconds, -0.02 * min(now + ahead, window.seconds)), now + ahead
 
 
 class EstimateFigure:
