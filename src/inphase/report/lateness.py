@@ -12,8 +12,8 @@ from inphase.channels import Role
 from inphase.metrics import difference
 from inphase.report.account import Account
 
-FARTHEST = 0.15  # of the run, that an answer may be late or early
-SHIFTS = 61
+FARTHEST = 0.25  # of the run, that an answer may be late or early
+SHIFTS = 101
 MOMENTS = 400  # at which answers are compared
 WINDOW, EVERY = 0.3, 0.1  # of the run: stretches that are looked at by themselves
 MOVES = 0.5  # of its deviation over the run: less in a stretch is resting
@@ -55,7 +55,7 @@ def lateness(account: Account, within: tuple[float, float] | None = None) -> Lat
     channels = [c for c in account.recording.channels if c.role is Role.CONTROLLED]
     moments = np.linspace(start, end, MOMENTS)
     answered = _course(account.now_times, account.now, moments)
-    farthest = FARTHEST * (times[-1] - times[0])
+    farthest = min(FARTHEST * (times[-1] - times[0]), (end - start) / 2)
     shifts = np.linspace(-farthest, farthest, SHIFTS)
     errors = np.empty((SHIFTS, len(moving)))
     for i, shift in enumerate(shifts.tolist()):
@@ -64,7 +64,9 @@ def lateness(account: Account, within: tuple[float, float] | None = None) -> Lat
     least = EXACT**2 * np.nanvar(truth[:, moving], axis=0)
     logarithms = np.log(np.maximum(errors, least))
     gains = logarithms - logarithms[SHIFTS // 2]
-    best = int(gains.mean(1).argmin())
+    over_all = gains.mean(1)
+    near_enough = np.flatnonzero(over_all <= over_all.min() + 1e-9)
+    best = int(near_enough[len(near_enough) // 2])
     kept = np.exp(gains[best])
     nearer = {account.names[k]: float(share) for k, share in zip(moving, kept, strict=True) if share < WORTH}
     return Lateness(float(shifts[best]), float(np.exp(gains[best].mean())), nearer)
