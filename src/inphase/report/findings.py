@@ -88,7 +88,7 @@ def _timing_between(account: Account, start: float, end: float) -> str:
         return ""
     slowest = min(estimates, key=lambda estimate: estimate.phase_velocity)
     said = (
-        f"The tempo was believed to be {slowest.phase_velocity / typical:.2f} of the typical one at least, at "
+        f"The tempo was believed to be as low as {slowest.phase_velocity / typical:.2f} of the typical one, at "
         f"{slowest.time - account.begin:.2f} s"
     )
     if len(account.progress) != len(account.estimates):

@@ -48,7 +48,7 @@ def _errors(account: Account) -> Iterator[Table]:
     final = [
         [f"final pose, foreseen after {100 * mark:.0f} %", _number(_final(account, mark, spread))] for mark in MARKS
     ]
-    timing = [["late by [s]", f"{late.seconds:+.2f}" if late.explains else "not: in time"]] if late else []
+    timing = [["late by [s]", f"{late.seconds:+.2f}" if late.explains else "not as a whole"]] if late else []
     yield _table("Foresight and timing", ["", ""], [*final, *timing])
 
 

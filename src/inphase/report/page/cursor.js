@@ -5,10 +5,10 @@ class Cursor {
     this.place = place;
     this.figure = figure;
     place.classList.add("under");
-    this.seen = element("div", "", place, "over seen");
-    this.news = element("div", "", place, "over seen");
-    this.line = element("div", "", place, "over line");
-    this.point = element("div", "", place, "over point");
+    for (const [part, kind] of [["seen", "seen"], ["news", "seen"], ["line", "line"], ["point", "point"]]) {
+      this[part] = element("div", "", place, `over ${kind}`);
+      this[part].style.display = "none";
+    }
   }
 
   // Where the figure's frame lies in its place, in pixels.
