@@ -47,8 +47,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     csv(folder / "bad empty", "time,a,b", *(f"{i},," for i in range(20)))
     wide = [",".join(str(i * j) for j in range(1, 502)) for i in range(20)]
     csv(folder / "bad wide", ",".join(["time", *(f"c{i}" for i in range(500))]), *wide)
-    csv(folder / "bad notes", "time,a,b", "0,1,2", "1,2,3", "2,5,3")
-    (folder / "bad notes/inphase-notes.json").write_text("{")
     return folder
 
 
@@ -146,12 +144,10 @@ def test_recordings_that_cannot_be_used_are_a_line_each(browser, address):
             "bad short": "expected at least 3 samples, got 1",
             "bad empty": "none is held against the others: no channel moves",
             "bad wide": "none is held against the others: expected at least",
-            "bad notes": "expected JSON, got something else",
         }.items():
             data = recordings(page, place, 1)
             expect(data.get_by_text(line).first).to_be_visible()
             expect(data.get_by_role("button", name="Look once more")).to_be_enabled()
-        recordings(page, "bad wide", 1)
         picture(page, "studio-wide")
 
 

@@ -6,6 +6,7 @@ import errno
 import logging
 import secrets
 import signal
+import socket
 import tempfile
 from contextlib import ExitStack, suppress
 from pathlib import Path
@@ -19,7 +20,6 @@ from bokeh.resources import Resources
 from bokeh.server.server import BaseServer
 from bokeh.server.tornado import BokehTornado
 from bokeh.server.views.static_handler import StaticHandler
-from tornado import netutil
 from tornado.httpserver import HTTPServer
 from tornado.httputil import HTTPHeaders
 from tornado.ioloop import IOLoop
@@ -58,11 +58,12 @@ class Studio:
         self._workers: list[Worker] = []
         self._exits = ExitStack()
         try:
-            sockets = netutil.bind_sockets(port, HOST)
+            listening = socket.create_server((HOST, port))
         except OSError as error:
             taken = "is taken" if error.errno == errno.EADDRINUSE else f"cannot be used: {error.strerror}"
             raise OptionError(f"--port: {port} {taken}; 0 takes one that is free") from None
-        self.port: int = sockets[0].getsockname()[1]
+        listening.setblocking(False)
+        self.port: int = listening.getsockname()[1]
         self.address = f"http://{HOST}:{self.port}/{self._token}/"
         self._pages = Path(self._exits.enter_context(tempfile.TemporaryDirectory(prefix="inphase-studio-")))
         self._loop = IOLoop.current()
@@ -81,7 +82,7 @@ class Studio:
             log_function=lambda handler: None,  # the address is a secret
         )
         http = HTTPServer(web)
-        http.add_sockets(sockets)
+        http.add_sockets([listening])
         self._server = BaseServer(self._loop, web, http)
 
     def __enter__(self) -> Studio:
