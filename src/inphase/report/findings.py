@@ -17,6 +17,7 @@ from inphase.result import Status
 BEGUN = 0.05  # of the phase: a partner who is farther has begun
 LONG_WAIT = 0.08  # of a typical interaction
 OTHER_TEMPO = 0.25  # relative difference that is worth a sentence
+MOMENT = 0.02  # of the run: who is as late is in time
 BEHIND = 0.1  # of the phase
 FEW_INSIDE = 0.75  # of the readings in the 90 % band
 MOST = 6  # of one kind
@@ -57,13 +58,14 @@ def _of_lateness(account: Account) -> Iterator[Finding]:
     late = lateness(account)
     if late is None:
         return
-    if late.explains:
+    length = float(account.times[-1] - account.times[0])
+    if late.explains and abs(late.seconds) > MOMENT * length:
         yield Finding(
             f"The response came {_how(late)}: moved by that, {_nearer(late.channels)}.", _worst(account), grave=True
         )
         return
     stretch = worst_stretch(account)
-    if stretch is None:
+    if stretch is None or abs(stretch[1].seconds) <= MOMENT * length:
         yield Finding("The response kept time: no shift in time would have brought it much nearer to what happened.")
         return
     (start, end), late = stretch

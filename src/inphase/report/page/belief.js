@@ -1,6 +1,5 @@
 // What the filter believed at a step: the cloud, densities, and how readings and weights hang together.
 
-const NINETY = 1.6449;
 const FIELDS = 60;  // of a density that is drawn
 
 class Belief {

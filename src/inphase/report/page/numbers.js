@@ -1,6 +1,7 @@
 // The packed numbers of a run (packing.py), as arrays with a shape.
 
 const KINDS = {u1: Uint8Array, i1: Int8Array, u4: Uint32Array, f4: Float32Array, q2: Uint16Array};
+const NINETY = 1.6449;  // deviations on either side that hold nine of ten
 const STEPS = 65534, NOTHING = 65535;
 
 function decode(text) {

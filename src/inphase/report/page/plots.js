@@ -15,6 +15,7 @@ class Plots {
       this.figures.push(figure);
       this.cursors.set(figure.name, new Cursor(place, figure));
     }
+    this.heights = new Map(this.figures.map(({name, height}) => [name, height]));
     this.range = this.document.get_model_by_name("across");
     let waiting = null;
     this.range.change.connect(() => {  // what is looked at more closely is drawn with more points
@@ -68,6 +69,12 @@ class Plots {
   still(state) {
     this.state = state;
     const run = state.run;
+    for (const kind of ["observed", "controlled"]) {  // few channels have more room
+      for (let slot = 0; slot < this.slots; slot++) {
+        const name = `${kind}-${slot}`;
+        this.source(name).height = {1: 320, 2: 230}[state[kind].length] ?? this.heights.get(name);
+      }
+    }
     for (let slot = 0; slot < this.slots; slot++) {
       const k = state.observed[slot];
       if (k !== undefined) {

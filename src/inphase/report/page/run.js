@@ -86,6 +86,8 @@ class Run {
       const {low, span, known} = this.arrays[name];
       return known[c] ? [low[c], low[c] + span[c]] : [];
     });
-    return ends.length ? [Math.min(...ends), Math.max(...ends)] : [0, 1];
+    if (!ends.length) return [0, 1];
+    const band = spread_of(this.column("now_std", c), 0.5, 0.5)[0] ?? 0;  // of most of the bands all is seen
+    return [Math.min(...ends) - NINETY * band, Math.max(...ends) + NINETY * band];
   }
 }
