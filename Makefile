@@ -13,7 +13,7 @@ ROS1 := $(if $(wildcard $(DEBIAN)/rospy/__init__.py),$(VENV)/ros1)
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint bench growth accuracy clean
+.PHONY: help demo test lint bench growth page accuracy pictures clean
 
 help:  ## what there is to make
 	@sed -n 's/^\([a-z]*\):.*##/make \1#/p' Makefile | while IFS='#' read -r target what; do printf '%-14s%s\n' "$$target" "$$what"; done
@@ -37,13 +37,20 @@ bench: $(VENV)/demo $(ROS1)  ## how long a step takes, beside plain loops and th
 	$(BIN)/python benchmarks/speed.py $(ARGS)
 	$(if $(ARGS),,$(BIN)/python benchmarks/live.py)
 	$(if $(ARGS),,$(BIN)/python benchmarks/loop.py)
+	$(if $(ARGS),,$(BIN)/python benchmarks/attach.py)
 	$(if $(ARGS),,$(if $(ROS1),$(BIN)/python benchmarks/ros1.py,@echo "benchmarks/ros1.py: needs ROS 1 (docs/ros.md)"))
 
 growth: $(VENV)/demo  ## how the cost of a step grows: the picture in docs/performance.md
 	$(BIN)/python benchmarks/growth.py --output docs/pictures/growth.png $(ARGS)
 
+page: $(VENV)/dev  ## the report of ten minutes: how large, how soon open, how smooth, in a browser
+	$(BIN)/python benchmarks/report.py $(ARGS)
+
 accuracy: $(VENV)/demo  ## how accurate the filters are on the recordings beside this folder: an hour or more
 	$(BIN)/python benchmarks/accuracy.py $(ARGS)
+
+pictures: $(VENV)/dev  ## the pictures of report and studio in docs/, made by the test that holds them true
+	INPHASE_SCREENSHOTS=$(CURDIR)/docs/pictures $(BIN)/pytest -q tests/test_report_pages.py
 
 clean:  ## remove the environment and what the tools leave behind
 	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis

@@ -93,7 +93,7 @@ def test_it_ends_with_the_picture_and_what_to_try_next(told, monkeypatch, capsys
     at = lines.index("next, try:")
     assert f"wrote the picture {Path('my demo/demo.png')}" in lines[at - 1]
     commands = [shlex.split(line) for line in lines[at + 1 :]]
-    assert [words[:2] for words in commands] == [["inphase", "inspect"], ["inphase", "replay"], ["inphase", "fit"]]
+    assert [words[:2] for words in commands] == [["inphase", name] for name in ("inspect", "replay", "report", "fit")]
     # They really work, pasted in the same folder.
     monkeypatch.chdir(told[0])
     for words in commands:

@@ -86,6 +86,7 @@ def demo(
     for words in (
         ["inspect", model_file],
         ["replay", model_file, recordings / f"{last.name}.csv", "--filter", "bip"],
+        ["report", model_file, recordings / f"{last.name}.csv", "-o", "report.html"],
         ["fit", recordings, "--observed", "x", "--controlled", "y", "--report", "-o", "my.inphase"],
     ):
         console.print(f"  {program()} {shlex.join(map(str, words))}")

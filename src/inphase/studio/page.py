@@ -24,7 +24,7 @@ def fill(document: Document, desk: Desk) -> None:
     document.title = f"inphase studio · {desk.folder.name}"
     document.theme = Theme(json={"attrs": {"UIElement": {"stylesheets": [_read("widgets.css")]}}})
     document.template = _read("page.html")  # type: ignore[assignment]
-    document.template_variables.update(tabs=list(TABS), folder=str(desk.folder), style=_read("page.css"))
+    document.template_variables.update(tabs=list(TABS), folder=desk.folder.name, style=_read("page.css"))
     for name, tab in TABS.items():
         document.add_root(column(tab.make_tab(desk), name=name, sizing_mode="stretch_width"))
 
