@@ -8,6 +8,7 @@ class Belief {
     this.cloud = new Scatter(place("cloud"));
     this.phase = new Density(place("phase"));
     this.tempo = new Density(place("tempo"));
+    for (const [name, drawing] of [["cloud", this.cloud], ["phase", this.phase], ["tempo", this.tempo]]) beside(drawing, place(name).parentElement);
     this.channels = [];
     this.section = document.getElementById("correlation");
     this.pair = null;
@@ -28,7 +29,9 @@ class Belief {
       const frame = element("figure", "", place, "plot");
       const {name, unit} = run.controlled[c];
       element("figcaption", unit ? `${name} now [${unit}]` : `${name} now`, frame);
-      return {c, density: new Density(element("div", "", frame, "drawing"), 170)};
+      const density = new Density(element("div", "", frame, "drawing"), 170);
+      beside(density, frame);
+      return {c, density};
     });
   }
 
@@ -116,6 +119,10 @@ class Belief {
       row.forEach((field, k) => tint(field, std * stds[k] > 0 ? product(p, columns[k]) / (std * stds[k]) : 0));
     });
   }
+}
+
+function beside(drawing, place) {
+  drawing.beside = new Beside(place, () => drawing.rows());
 }
 
 function gaussian(low, high, mean, std) {

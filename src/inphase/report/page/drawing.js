@@ -40,6 +40,20 @@ class Density {
     [low, high].forEach((end, i) => { this.ends[i].textContent = shown(end); });
     this.centre.textContent = words;
     this.root.setAttribute("aria-label", words);
+    this.drawn = {low, high, heights, truth};
+    this.beside?.draw();
+  }
+
+  // What the table beside it holds: where a share of the density lies below.
+  rows() {
+    if (!this.drawn) return [["nothing yet"]];
+    const {low, high, heights, truth} = this.drawn, total = heights.reduce((sum, h) => sum + h, 0);
+    const below = share => {
+      let sum = 0;
+      const i = heights.findIndex(h => (sum += h) >= share * total);
+      return total > 0 ? low + (high - low) * i / (heights.length - 1) : NaN;
+    };
+    return [["share below", "at"], ...[0.05, 0.25, 0.5, 0.75, 0.95].map(share => [`${100 * share} %`, below(share)]), ["true or typical", truth]];
   }
 }
 
@@ -54,6 +68,7 @@ class Scatter {
 
   // demonstrations, clouds: flat x, y, x, y, …; the axes hold all of both.
   open(demonstrations, clouds, shares) {
+    this.demonstrations = demonstrations;
     let reach = 1e-12;
     for (const value of demonstrations) reach = Math.max(reach, Math.abs(value));
     for (let i = 0; i < clouds.raw.length; i += 7) reach = Math.max(reach, Math.abs(clouds.at(i)));
@@ -77,5 +92,16 @@ class Scatter {
       circles[i].setAttribute("cx", x.toFixed(1));
       circles[i].setAttribute("cy", y.toFixed(1));
     }
+    this.drawn = points;
+    this.beside?.draw();
+  }
+
+  // What the table beside it holds: where the cloud is and how wide, and the demonstrations.
+  rows() {
+    const moments = (values, axis) => {
+      const own = Array.from(values ?? []).filter((_, i) => i % 2 === axis), mean = own.reduce((sum, v) => sum + v, 0) / own.length;
+      return [mean, Math.sqrt(own.reduce((sum, v) => sum + (v - mean) ** 2, 0) / own.length)];
+    };
+    return [["", "1st", "±", "2nd", "±"], ...[["belief", this.drawn], ["demonstrations", this.demonstrations]].map(([name, values]) => [name, ...moments(values, 0), ...moments(values, 1)])];
   }
 }
