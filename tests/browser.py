@@ -67,6 +67,6 @@ def watched(started: Any, home: tuple[str, ...] = ("file://",), **context: Any) 
     try:
         seen = Watched(opened.new_page(), home)
         yield seen
-        assert seen.troubles == []
+        assert seen.troubles == [], seen.troubles
     finally:
         opened.close()

@@ -43,7 +43,8 @@ class Plots {
   // From where to where the axis goes for all runs.
   reset(state) {
     const length = Math.max(...this.runs.map(run => run.length), 1e-3);
-    this.range.setv(state.axis === "time" ? {start: -0.01 * length, end: 1.01 * length} : {start: -0.01, end: 1.01});
+    const [start, end] = state.axis === "time" ? [-0.01 * length, 1.01 * length] : [-0.01, 1.01];
+    this.range.setv({start, end, reset_start: start, reset_end: end});
   }
 
   curve(name, run, times, values) {
