@@ -26,7 +26,17 @@ hypothesis.settings.register_profile("dev", deadline=None)
 hypothesis.settings.load_profile("ci" if os.environ.get("CI") else "dev")
 
 # What takes longest begins first: a slow file that is begun last keeps one processor busy and the others waiting.
-SLOWEST = ["test_filters", "test_examples", "test_readme", "test_orderings", "test_calibrate"]
+SLOWEST = [
+    "test_studio_browser",
+    "test_examples",
+    "test_report_page",
+    "test_train_tab",
+    "test_report_pages",
+    "test_readme",
+    "test_filters",
+    "test_session",
+    "test_orderings",
+]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

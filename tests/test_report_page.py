@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import socket
 from contextlib import ExitStack, suppress
@@ -705,25 +704,3 @@ def test_a_thinned_curve_keeps_its_peaks_and_its_gaps(chromium, rng):
     within = (times >= 100) & (times <= 110)
     assert set(times[within]) <= set(x)  # looked at closely, all of it
     page.close()
-
-
-# ------------------------------------------------------------------------------------------------------------- pictures
-
-
-def test_pictures_of_the_page(opened, pages, tmp_path):
-    folder = Path(os.environ.get("INPHASE_SCREENSHOTS") or tmp_path)
-    folder.mkdir(parents=True, exist_ok=True)
-    looks = {
-        "light": ("one", {}),
-        "dark": ("one", DARK),
-        "narrow": ("one", {"viewport": NARROW}),
-        "compared": ("three", {}),
-    }
-    for look, (name, context) in looks.items():
-        report = opened(name, **context)
-        report.to(15)
-        if look == "compared":
-            report.show("#compared")
-        picture = folder / f"report-{look}.png"
-        report.page.screenshot(path=picture)
-        assert picture.stat().st_size > 20_000
