@@ -16,7 +16,7 @@ from inphase.filters.belief import GaussianBelief
 from inphase.filters.cloud import Cloud, cloud
 from inphase.replay import identical, provenance_of, session_of, steps
 from inphase.report import glimpse as looking
-from inphase.report.account import FRAMES, SAMPLES, frame_steps, of_demonstration, of_recording
+from inphase.report.account import FRAMES, SAMPLES, account_of_demonstration, account_of_recording, frame_steps
 from inphase.report.glimpse import PHASES, Lens
 from inphase.report.steady import beside, steady
 from inphase.report.summary import summarise
@@ -268,7 +268,7 @@ def live(model, tmp_path_factory):
 
 
 def test_a_recorded_run_is_told_as_it_was(live, model):
-    account = of_recording(live, model)
+    account = account_of_recording(live, model)
     assert account.remarks == ()
     assert len(live.estimates) > 20
     assert all(identical(one, other) for one, other in zip(account.estimates, live.estimates, strict=True))
@@ -287,7 +287,7 @@ def test_a_recorded_run_is_told_as_it_was(live, model):
 
 
 def test_without_a_model_it_is_told_as_recorded_and_says_so(live):
-    account = of_recording(live)
+    account = account_of_recording(live)
     assert account.estimates == live.estimates
     assert account.model is account.lens is None
     assert all(frame.glimpse is None for frame in account.frames)
@@ -295,7 +295,7 @@ def test_without_a_model_it_is_told_as_recorded_and_says_so(live):
 
 
 def test_with_another_model_it_is_told_as_recorded_and_says_so(live):
-    account = of_recording(live, taught(dataset(np.random.default_rng(1))))
+    account = account_of_recording(live, taught(dataset(np.random.default_rng(1))))
     assert account.estimates == live.estimates
     assert account.model is None
     assert "expected the model it was recorded with" in account.remarks[0]
@@ -305,23 +305,27 @@ def test_estimates_that_do_not_come_out_again_are_counted(live, model):
     changed = list(live.estimates)
     for i, field in ((3, "phase_std"), (20, "log_likelihood")):
         changed[i] = replace(changed[i], **{field: float(np.nextafter(getattr(changed[i], field), 9.0))})
-    account = of_recording(replace(live, estimates=tuple(changed)), model)
+    account = account_of_recording(replace(live, estimates=tuple(changed)), model)
     (remark,) = account.remarks
     assert remark.startswith(f"2 of {len(changed)} estimates do not come out again")
     fewer = replace(live, estimates=live.estimates[:-3], responses=live.responses[:-3])
-    assert of_recording(fewer, model).remarks[0].startswith(f"3 of {len(changed) - 3} estimates do not come out again")
+    assert (
+        account_of_recording(fewer, model)
+        .remarks[0]
+        .startswith(f"3 of {len(changed) - 3} estimates do not come out again")
+    )
 
 
 def test_a_run_of_nothing_has_an_account(live, model):
     nothing = replace(live, times=live.times[:0], values=live.values[:0], estimates=(), responses=())
-    account = of_recording(nothing, model)
+    account = account_of_recording(nothing, model)
     assert account.estimates == ()
     assert account.remarks == ("nothing was observed in it",)
     assert summarise(account)
 
 
 def test_a_demonstration_is_played_by_its_observed_channels_alone(model, episode):
-    account = of_demonstration(model, episode, "bip", 4)
+    account = account_of_demonstration(model, episode, "bip", 4)
     session = model.session("bip", 4)
     for i, (time, values) in enumerate(zip(episode.times, episode.values, strict=True)):
         assert identical(account.estimates[i], session.observe(float(time), values[:2]))
@@ -332,7 +336,7 @@ def test_a_demonstration_is_played_by_its_observed_channels_alone(model, episode
     assert_array_equal(account.progress, episode.phases)
     other = np.array(episode.values)
     other[:, 2:] += 5.0
-    told = of_demonstration(model, inphase.Demonstration(episode.times, other, "other"), "bip", 4)
+    told = account_of_demonstration(model, inphase.Demonstration(episode.times, other, "other"), "bip", 4)
     assert all(identical(one, two) for one, two in zip(told.estimates, account.estimates, strict=True))
 
 
@@ -345,7 +349,7 @@ def test_of_long_runs_evenly_many_steps_are_told_in_full():
 
 
 def test_the_tables_hold_the_errors_of_the_response_now(model, episode):
-    account = of_demonstration(model, episode, "bip")
+    account = account_of_demonstration(model, episode, "bip")
     error = account.now - episode.values[:, 2:]
     table = next(table for table in summarise(account) if table["title"] == "Response now")
     spread = model.spread[2:]
@@ -364,7 +368,7 @@ def test_what_the_controlled_channels_did_is_read_from_the_recording(model):
     values[:, :2] = model.predict(0.9 * times)[:, :2]
     values[4:17:3, 2] = 3.0 * times[4:17:3] - 1.0  # read now and then, along a line
     recording = inphase.recording.Recording("r", model.channels, times, values, (), (), provenance_of(model, "bip"))
-    truth = of_recording(recording, model).truth
+    truth = account_of_recording(recording, model).truth
     within = (times >= times[4]) & (times <= times[16])
     assert_allclose(truth[within, 0], 3.0 * times[within] - 1.0, atol=1e-12)
     assert np.isnan(truth[~within, 0]).all()

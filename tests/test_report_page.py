@@ -18,7 +18,7 @@ import inphase
 from inphase.channels import make_channels
 from inphase.recording import RecordedEvent, Recording
 from inphase.replay import provenance_of
-from inphase.report.account import SAMPLES, of_demonstration, of_recording
+from inphase.report.account import SAMPLES, account_of_demonstration, account_of_recording
 from inphase.report.glimpse import Lens
 from inphase.report.page.document import HERE, write_page
 from inphase.report.page.packing import STEPS, Packing
@@ -70,9 +70,13 @@ def pages(played, tmp_path_factory):
     """The files: one run; three that are compared; one whose every name and word is hostile."""
     folder = tmp_path_factory.mktemp("reports")
     model, episode = played
-    one = of_demonstration(model, episode, "bip")
+    one = account_of_demonstration(model, episode, "bip")
     other = inphase.Demonstration(1.4 * episode.times, episode.values, "slow")
-    three = [one, of_demonstration(model, episode, "ebip", members=30), of_demonstration(model, other, "bip")]
+    three = [
+        one,
+        account_of_demonstration(model, episode, "ebip", members=30),
+        account_of_demonstration(model, other, "bip"),
+    ]
     write_page(folder / "one.html", [one])
     write_page(folder / "three.html", three, "compared")
     write_page(folder / "hostile.html", [hostile(episode)], f"{HOSTILE[3]} </title>{HOSTILE[1]} {HOSTILE[2]}")
@@ -87,7 +91,7 @@ def hostile(episode):
     events = tuple(RecordedEvent(0.1 * i, word, word, word, word) for i, word in enumerate(HOSTILE, 1))
     told = {**provenance_of(model, "bip"), "damage": HOSTILE[0]}
     recording = Recording(HOSTILE[1], channels, demos[0].times, values, (), (), told, events=events)
-    account = of_recording(recording, model, title=HOSTILE[0])
+    account = account_of_recording(recording, model, title=HOSTILE[0])
     return replace(account, remarks=tuple(HOSTILE))
 
 

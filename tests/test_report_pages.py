@@ -29,10 +29,13 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patched.chdir(folder)
         assert main(["demo", "--shapes", "Sine"]) == 0
         page = (DOCS / "report.md").read_text(encoding="utf-8")
-        for command in (line for kind, _, text in blocks(page) if kind == "sh" for line in commands(text)):
-            program, *arguments = shlex.split(command)
-            assert program == "inphase"
-            assert main(arguments) == 0
+        for kind, _, text in blocks(page):
+            if kind == "python":
+                exec(text, {})
+            for command in commands(text) if kind == "sh" else ():
+                program, *arguments = shlex.split(command)
+                assert program == "inphase"
+                assert main(arguments) == 0
     return folder
 
 

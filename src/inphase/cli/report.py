@@ -17,7 +17,7 @@ from inphase.filters import RECOMMENDED, make
 from inphase.io import read_recorded_model, read_recording
 from inphase.io.atomic import check_target
 from inphase.model import Model
-from inphase.report.account import Account, of_demonstration, of_recording
+from inphase.report.account import Account, account_of_demonstration, account_of_recording
 from inphase.report.page.document import check_page, write_page
 from inphase.report.page.figures import RUNS
 from inphase.trajectory import Demonstration
@@ -91,7 +91,7 @@ def _recorded(runs: Sequence[Path], named: Path | None, quick: bool) -> list[Acc
         recording = read_recording(run)
         model = given or (None if quick else read_recorded_model(run))
         with working(title) as told:
-            account = of_recording(recording, model, title=title, told=told)
+            account = account_of_recording(recording, model, title=title, told=told)
         accounts.append(replace(account, remarks=(UNASKED,)) if quick and given is None else account)
     return accounts
 
@@ -108,7 +108,7 @@ def _played(path: Path, recordings: Sequence[str], format: Format, filters: Sequ
     for episode in episodes:
         for name in filters:
             with working(f"{episode.name}, {name}") as told:
-                accounts.append(of_demonstration(model, episode, name, seed, told=told))
+                accounts.append(account_of_demonstration(model, episode, name, seed, told=told))
     return accounts
 
 

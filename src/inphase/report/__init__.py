@@ -1,6 +1,8 @@
-"""Pictures of what a model believes: for papers and notebooks here, for the command line in the modules beside."""
+"""Pictures of what a model believes, for papers and notebooks, and the page of a run; the rest is for commands."""
 
+from inphase.report.account import Account, account_of_demonstration, account_of_recording
 from inphase.report.correlation import channel_correlation, weight_correlation
+from inphase.report.page.document import write_page
 from inphase.report.plots.basis import plot_basis
 from inphase.report.plots.correlation import plot_correlation
 from inphase.report.plots.demonstrations import plot_demonstrations
@@ -9,6 +11,9 @@ from inphase.report.plots.phase import plot_phase_densities
 from inphase.report.plots.response import plot_response
 
 __all__ = [
+    "Account",
+    "account_of_demonstration",
+    "account_of_recording",
     "channel_correlation",
     "plot_basis",
     "plot_correlation",
@@ -17,4 +22,5 @@ __all__ = [
     "plot_phase_densities",
     "plot_response",
     "weight_correlation",
+    "write_page",
 ]

@@ -84,7 +84,7 @@ class Account:
         return float(self.recording.times[0]) if len(self.recording.times) else 0.0
 
 
-def of_demonstration(
+def account_of_demonstration(
     model: Model,
     demonstration: Demonstration,
     filter: str | None = None,
@@ -108,7 +108,7 @@ def of_demonstration(
     return replace(account, truth=truth, progress=demonstration.phases)
 
 
-def of_recording(
+def account_of_recording(
     recording: Recording, model: Model | None = None, *, title: str | None = None, told: Told | None = None
 ) -> Account:
     """The account of a recorded run: with a model it is played again, for what it believed; without, as recorded.
