@@ -232,6 +232,12 @@ SAID = {
     ),
     "refused": (("refused (the readings", "2 times, 0.25 s"), {"status": troubled(Status.REFUSED)}, False, 0.6),
     "safety": (("running → stopped: too fast",), {"events": [event(0.7)]}, True, 0.7),
+    "well again": (
+        ("holding → running: all was well",),
+        {"events": [event(0.7, before="HOLDING", after="RUNNING", reason="all was well")]},
+        False,
+        0.7,
+    ),
     "band": (("c1 was in the 90 % band only 60 %",), {"now": OFF, "std": NARROW}, False, 0.75),
     "unended": (("never told",), {"status": [Status.FOLLOWING] * len(TIMES)}, False, None),
 }
@@ -246,7 +252,7 @@ def test_what_strikes_is_said_and_where_to_look(case):
     assert found[0].grave == grave
     if time is not None:
         assert found[0].time == pytest.approx(time, abs=0.006)
-    events = [event(1e6 + e.time) for e in changed.get("events", ())]
+    events = [replace(e, time=1e6 + e.time) for e in changed.get("events", ())]
     later = account(TIMES + 1e6, progress=PHASES, **{**changed, "events": events})
     assert [finding.says for finding in find(later)] == [finding.says for finding in find(told)]  # whatever clocks read
 

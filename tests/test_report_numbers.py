@@ -286,6 +286,16 @@ def test_a_recorded_run_is_told_as_it_was(live, model):
         assert frame.glimpse is not None
 
 
+def test_what_was_answered_counts_and_not_what_would_be_answered_now(live, model):
+    """As with a lookahead, which the session that plays it again does not have."""
+    ahead = tuple(r and replace(r, times=r.times + 0.2, mean=r.mean + 1.0) for r in live.responses)
+    account, told = account_of_recording(replace(live, responses=ahead), model), account_of_recording(live, model)
+    for i, response in enumerate(live.responses):
+        later, moved = (0.2, 1.0) if response is not None else (0.0, 0.0)
+        assert account.now_times[i] == pytest.approx(told.now_times[i] + later)
+        assert_allclose(account.now[i], told.now[i] + moved)
+
+
 def test_without_a_model_it_is_told_as_recorded_and_says_so(live):
     account = account_of_recording(live)
     assert account.estimates == live.estimates

@@ -21,6 +21,7 @@ MOMENT = 0.02  # of the run: who is as late is in time
 BEHIND = 0.1  # of the phase
 FEW_INSIDE = 0.75  # of the readings in the 90 % band
 MOST = 6  # of one kind
+WELL = "RUNNING"  # the state of a loop in which the robot is led by the response
 
 
 @dataclass(frozen=True)
@@ -206,9 +207,8 @@ def _told_spells(spells: list[Spell], account: Account) -> Finding:
 def _of_events(account: Account) -> Iterator[Finding]:
     changes = [event for event in account.recording.events if event.kind == "safety" and event.after]
     for event in changes[:MOST]:
-        yield Finding(
-            f"{event.before.lower()} → {event.after.lower()}: {event.reason}", event.time - account.begin, grave=True
-        )
+        says = f"{event.before.lower()} → {event.after.lower()}: {event.reason}"
+        yield Finding(says, event.time - account.begin, grave=event.after != WELL)
 
 
 def _of_band(account: Account) -> Iterator[Finding]:

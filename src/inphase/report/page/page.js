@@ -50,6 +50,7 @@ function open_run(run) {
   if (runs.length > 1) draw_summary(document.querySelector("#compared .tables"), compared());
   draw_course_legend(run);
   document.querySelector("#controlled .legend .sent").hidden = !run.has("command_times");
+  document.querySelector("#controlled .legend .ink").hidden = !run.has("truth");
   plots.state = state;
   plots.reset(state);
   redraw();
