@@ -27,7 +27,7 @@ NINETY = 1.6449
 OBSERVED, CONTROLLED = [f"seen_{i}" for i in range(5)], [f"own_{i}" for i in range(6)]
 HOSTILE = [
     "<img src=x onerror=alert(1)>",
-    "</script><script>alert(2)</script>",
+    "<!--<script </script><script>alert(2)</script>",
     "$$\\sqrt{x}$$",
     "{{title}}",
     "\"'&amp;`${alert(3)}",
