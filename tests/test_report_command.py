@@ -244,6 +244,16 @@ def test_what_cannot_be_reported_is_one_clear_line(folder, refused, tmp_path):
     assert "missing.inphase" in refused(run_, "--model", folder / "missing.inphase")
 
 
+def test_what_is_wrong_from_the_first_is_said_before_anything_is_played(folder, refused, monkeypatch):
+    def played(*given, **options):
+        raise AssertionError("played")
+
+    for name in ("account_of_recording", "account_of_demonstration"):
+        monkeypatch.setattr(f"inphase.cli.report.{name}", played)
+    assert "nowhere" in refused(folder / "run.mcap", output="nowhere/out.html")
+    assert "kalman" in refused(folder / "m.inphase", folder / "episode0.csv", "--filter", "bip", "kalman")
+
+
 def test_a_file_that_is_no_recording_is_one_clear_line(folder, refused, tmp_path):
     for content in (b"", b"time,a\n0,1\n", bytes(range(256)) * 4):
         bad = folder / "bad.mcap"
