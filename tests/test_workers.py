@@ -356,3 +356,18 @@ def test_the_benchmark_of_workers_runs(shared_data):
     result = subprocess.run([*command, "--data", "nowhere"], capture_output=True, text=True)
     assert result.returncode == 2
     assert "expected the recordings nowhere" in result.stderr
+
+
+def test_tasks_that_are_dropped_at_an_interrupt_are_not_missed():
+    """The thread that hands them out finds their numbers and no tasks: its complaint is nobody's."""
+
+    def interrupted():
+        with workers(2) as team:
+            assert [team.start(partial(abs, -1)).result() for _ in range(2)] == [1, 1]
+            for _ in range(40):
+                team.start(partial(time.sleep, 30))
+            time.sleep(0.5)  # two are begun, so that there is room for others
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -82,13 +83,30 @@ def _processes(jobs: int) -> Iterator[Callable[..., Future[Any]]]:
     try:
         yield pool.submit
     except BaseException as error:
-        pool.shutdown(kill_workers=True)
+        with _quietly():
+            pool.shutdown(kill_workers=True)
         if isinstance(error, TerminatedWorkerError):
             raise WorkerError(f"one of {jobs} processes was killed; where memory is short, try fewer jobs") from None
         if isinstance(error, BrokenProcessPool):  # it could not read its task: a function of a module it does not find
             cause = str(error.__cause__ or error).strip('" \n').splitlines()[-1]
             raise WorkerError(f"one of {jobs} processes could not read its work: {cause}") from None
         raise
+
+
+@contextmanager
+def _quietly() -> Iterator[None]:
+    """The thread that hands out tasks may look for some that were dropped while it ends: nobody misses them."""
+    usual = threading.excepthook
+
+    def hook(told: threading.ExceptHookArgs) -> None:
+        if not (issubclass(told.exc_type, KeyError) and type(told.thread).__module__.startswith("joblib.")):
+            usual(told)
+
+    threading.excepthook = hook
+    try:
+        yield
+    finally:
+        threading.excepthook = usual
 
 
 def _here(task: Task) -> Future[Any]:
