@@ -307,3 +307,30 @@ def _check_trajectory(command: Command, before: Command | None, now: float, faul
         known = time <= before.times[-1] or np.array_equal(time, command.times[0])
         if known and not np.allclose(position, expected, rtol=0, atol=1e-9):
             faults.append(f"{now:.4f} s: goes on at {position}, where {expected} was sent")
+
+
+def simulated(model: str, tempo: float, samples: int) -> str:
+    """A configuration of `inphase live` with a simulated partner and robot, which records."""
+    return f"""
+model = "{model}"
+[filter]
+name = "bip"
+[rates]
+sense = 60
+respond = 15
+command = 40
+[sensors.partner]
+device = "simulated_partner"
+tempo = {tempo}
+clock = "shared"
+[robot]
+device = "simulated_robot"
+home = {{grip = 0.8, turn = 0.0}}
+[robot.limits."*"]
+velocity = 2.0
+acceleration = 20.0
+[response]
+samples = {samples}
+[recording]
+folder = "runs"
+"""

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from interactions import dataset, shapes_unchecked, taught
+from rigs import simulated
 
 import inphase
 from inphase.io import read_recorded_model, read_recording
@@ -19,29 +20,6 @@ from inphase.replay import identical, replay
 
 KILLS = 20
 AT_ONCE = 5
-INTERACTION = """
-model = "model.inphase"
-[filter]
-name = "bip"
-[rates]
-sense = 60
-respond = 15
-command = 40
-[sensors.partner]
-device = "simulated_partner"
-tempo = 0.3
-clock = "shared"
-[robot]
-device = "simulated_robot"
-home = {grip = 0.8, turn = 0.0}
-[robot.limits."*"]
-velocity = 2.0
-acceleration = 20.0
-[response]
-samples = 10
-[recording]
-folder = "runs"
-"""
 FORKED = """
 import os, signal, sys
 import mcap.writer, threadpoolctl  # with what is read on the way
@@ -67,7 +45,7 @@ def test_killed_at_any_time(tmp_path: Path) -> None:
     folders = [tmp_path / f"{i}" for i in range(KILLS)]
     for folder in folders:
         folder.mkdir()
-        (folder / "run.toml").write_text(INTERACTION)
+        (folder / "run.toml").write_text(simulated("model.inphase", tempo=0.3, samples=10))
         model.save(folder / "model.inphase")
     program = [sys.executable, "-c", FORKED]
     single = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}

@@ -623,7 +623,7 @@ def test_the_page_itself_forbids_to_contact_anyone(chromium, pages):
                 const refused = [];
                 const add = (tag, told) => document.body.append(Object.assign(document.createElement(tag), told));
                 document.addEventListener("securitypolicyviolation", event => refused.push(event.effectiveDirective));
-                await fetch(home).catch(() => 0);
+                await fetch(home, {signal: AbortSignal.timeout(1000)}).catch(() => 0);  // nobody answers
                 add("img", {src: `${home}a.png`});
                 add("script", {src: `${home}a.js`});
                 add("link", {rel: "stylesheet", href: `${home}a.css`});

@@ -16,6 +16,8 @@ from playwright.sync_api import expect
 from studios import WAIT, opened, picture, studio, tab, write
 
 import inphase
+from inphase.replay import provenance_of
+from inphase.runtime.recorder import Recorder
 
 MARKUP = "<img src=x onerror=window.hacked=1>"
 
@@ -39,7 +41,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("studio")
     write(folder / "plain")
     dataset = inphase.load(folder / "plain", observed=OBSERVED, controlled=CONTROLLED)
-    inphase.fit(dataset, calibrate=False).save(folder / "model.inphase")
+    model = inphase.fit(dataset, calibrate=False)
+    model.save(folder / "model.inphase")
+    session = model.session("bip")
+    with Recorder(folder / "run.mcap", model.channels, provenance_of(model, "bip"), model=model) as recorder:
+        for time, values in zip(dataset[0].times, dataset[0].values, strict=True):
+            seen = values[: len(OBSERVED)]
+            recorder.put_step(seen, session.observe(time, seen))
     write(folder / "dropped", episodes=4)
     write(folder / "roles", ["hand_x", "hand_y", "robot_x", "robot_y"], episodes=3)
     csv(folder / "bad broken", "time,a,b", "0,1,2", "1,x,3")
@@ -211,3 +219,6 @@ def test_an_episode_is_played_to_two_filters(browser, address):
         frame = tried.frame_locator("iframe")
         expect(frame.locator("canvas").first).to_be_visible()
         picture(page, "studio-try-1280-light")
+        tried.get_by_role("button", name="Open the report").click()  # of a run, in the place of the page before
+        expect(frame.locator("h1")).to_have_text("run")
+        expect(frame.locator("#moment")).to_contain_text("step 1 of")

@@ -17,6 +17,8 @@ import numpy as np
 import pytest
 from browser import NARROW, WIDE, browser, watched
 from interactions import dataset, taught
+from rigs import simulated
+from studios import picture
 
 from inphase import Estimate, Response, Status
 from inphase.channels import make_channels
@@ -29,29 +31,6 @@ from inphase.studio import live_words as words
 from inphase.studio.live_window import EVENTS, POINTS, LiveWindow
 
 SCREENSHOTS = os.environ.get("INPHASE_SCREENSHOTS")
-INTERACTION = """
-model = "handover.inphase"
-[filter]
-name = "bip"
-[rates]
-sense = 60
-respond = 15
-command = 40
-[sensors.partner]
-device = "simulated_partner"
-tempo = 0.03
-clock = "shared"
-[robot]
-device = "simulated_robot"
-home = {grip = 0.8, turn = 0.0}
-[robot.limits."*"]
-velocity = 2.0
-acceleration = 20.0
-[response]
-samples = 20
-[recording]
-folder = "runs"
-"""
 OLD = time.mktime((2026, 1, 2, 3, 4, 0, 0, 0, -1))
 EVIL = "<img src=x onerror=alert(1)>"
 
@@ -79,7 +58,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a configuration that is ready to run, and the recording of another whose names hold markup."""
     made = tmp_path_factory.mktemp("live")
     taught(dataset(np.random.default_rng(0))).save(made / "handover.inphase")
-    (made / "run.toml").write_text(INTERACTION)
+    (made / "run.toml").write_text(simulated("handover.inphase", tempo=0.03, samples=20))
     channels = make_channels(["hand"], [EVIL, *(f"joint_{i}" for i in range(500))])
     with Recorder(made / "odd.mcap", channels, name=EVIL) as recorder:
         recorder.put_event(RecordedEvent(0.0, EVIL, EVIL, EVIL, EVIL))
@@ -126,12 +105,6 @@ def opened(started: Any, address: str) -> Iterator[Callable[..., Any]]:
             return new
 
         yield page
-
-
-def picture(page: Any, name: str) -> None:
-    if SCREENSHOTS:
-        Path(SCREENSHOTS).mkdir(parents=True, exist_ok=True)
-        page.screenshot(path=Path(SCREENSHOTS) / f"{name}.png", full_page=True)
 
 
 def shown(page: Any, words: str) -> None:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import secrets
 import time
-from html import escape
-from pathlib import Path
 
 from bokeh.layouts import column, row
 from bokeh.models import LayoutDOM
@@ -20,6 +17,7 @@ from inphase.studio.command import Command
 from inphase.studio.desk import Desk
 from inphase.studio.figures.live import ChannelFigure, EstimateFigure, move, time_range
 from inphase.studio.live_window import LiveWindow
+from inphase.studio.report_frame import ReportFrame
 from inphase.studio.runs import Run, runs
 from inphase.studio.text import as_html, heading, text
 from inphase.studio.worker import Outcome
@@ -68,16 +66,15 @@ class LiveTab:
             EstimateFigure(times, "log-likelihood of the samples", "", "log_likelihood", height=150),
         ]
         self._drawn = [ChannelFigure(times) for _ in range(DRAWN)]
-        self._page = self._new_page()
+        self._shown = ReportFrame(desk)
         self._report = Action(desk, "Make its report", self._report_command, self._made, with_output=False)
-        self._shown = Div(disable_math=True, sizing_mode="stretch_width", css_classes=["report"])
         self._plots = column(
             *(each.figure for each in self._estimates),
             self._channels,
             *(each.figure for each in self._drawn),
             sizing_mode="stretch_width",
         )
-        self._after = column(self._summary, self._report.layout, self._shown, sizing_mode="stretch_width")
+        self._after = column(self._summary, self._report.layout, self._shown.layout, sizing_mode="stretch_width")
         self._all = column(
             self._state,
             self._figures,
@@ -140,7 +137,8 @@ class LiveTab:
         self._name, self._window = name, LiveWindow(seconds)
         self._follower = follow_recording(self._desk.path(name), last=seconds)
         self._attach.label = "Detach"
-        self._shown.text, self._after.visible = "", False
+        self._shown.clear()
+        self._after.visible = False
         self._all.visible = True
         self._report.refresh()
         self._look()
@@ -226,23 +224,12 @@ class LiveTab:
     def _report_command(self) -> Command:
         if not self._name:
             raise OptionError("attach to a run first")
-        return Command.of("report", self._name, options={"o": str(self._page)})
+        return self._shown.command(self._name)
 
     def _made(self, outcome: Outcome) -> None:
-        """The page that was written, which can reach nothing of the studio."""
-        page = Path(outcome.command.arguments[-1])
-        if not (outcome.fine and page.is_file()):
-            return
-        address = escape(self._desk.address_of(page), quote=True)
-        self._page = self._new_page()
-        self._shown.text = (
-            f'<p><a href="{address}" target="_blank" rel="noopener">open it in a tab of its own</a></p>'
-            f'<iframe src="{address}" title="report" sandbox="allow-scripts allow-downloads"></iframe>'
-        )
-        self._report.refresh()
-
-    def _new_page(self) -> Path:
-        return self._desk.pages / f"live-{secrets.token_hex(4)}.html"
+        """The page that was written; the next is another."""
+        if self._shown.show(outcome):
+            self._report.refresh()
 
 
 def make_tab(desk: Desk) -> LayoutDOM:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import secrets
-from html import escape
-from pathlib import Path
-
 from bokeh.layouts import column, row
 from bokeh.models import LayoutDOM
-from bokeh.models.widgets import CheckboxButtonGroup, Div, MultiSelect, Select, Spinner
+from bokeh.models.widgets import CheckboxButtonGroup, MultiSelect, Select, Spinner
 
 from inphase.errors import OptionError
 from inphase.filters import FILTERS, RECOMMENDED
 from inphase.studio.action import Action
-from inphase.studio.command import Command, Value
+from inphase.studio.command import Command
 from inphase.studio.desk import Desk
+from inphase.studio.report_frame import ReportFrame
 from inphase.studio.text import heading, text
 from inphase.studio.worker import Outcome
 
@@ -29,8 +26,7 @@ class TryTab:
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
-        self._shown: Path | None = None
-        self._page = self._new_page()
+        self._report = ReportFrame(desk)
         self._model = Select(title="Model", sizing_mode="stretch_width")
         self._episode = Select(title="Episode", sizing_mode="stretch_width")
         self._filters = CheckboxButtonGroup(labels=list(FILTERS), active=[list(FILTERS).index(RECOMMENDED)])
@@ -38,7 +34,6 @@ class TryTab:
         self._runs = MultiSelect(title="Recorded runs, the newest first", size=5, sizing_mode="stretch_width")
         self._play = Action(desk, "Play", self._played, self._show, with_output=False)
         self._open = Action(desk, "Open the report", self._reported, self._show, with_output=False)
-        self._report = Div(disable_math=True, sizing_mode="stretch_width", css_classes=["report"])
         self._no_runs = text("There is no recorded run (.mcap) in the folder: inphase live writes one.", kind="quiet")
         self._model.on_change("value", lambda name, before, value: desk.choose(model=value))
         self._filters.on_change("active", lambda name, before, value: self._play.refresh())
@@ -63,7 +58,7 @@ class TryTab:
                 css_classes=["wrap"],
                 sizing_mode="stretch_width",
             ),
-            self._report,
+            self._report.layout,
             sizing_mode="stretch_width",
         )
         self._list()
@@ -87,9 +82,6 @@ class TryTab:
         self._no_runs.visible = not runs
         self._open.refresh()
 
-    def _new_page(self) -> Path:
-        return self._desk.pages / f"report-{secrets.token_hex(4)}.html"
-
     def _played(self) -> Command:
         if not self._model.value:
             raise OptionError("there is no model yet: the Train tab makes one")
@@ -98,26 +90,16 @@ class TryTab:
         filters = [list(FILTERS)[i] for i in sorted(self._filters.active)]
         if not filters:
             raise OptionError("choose a filter, or several")
-        options: dict[str, Value] = {"filter": filters, "seed": int(self._seed.value or 0), "o": str(self._page)}
-        return Command.of("report", str(self._model.value), str(self._episode.value), options=options)
+        source = str(self._model.value), str(self._episode.value)
+        return self._report.command(*source, filter=filters, seed=int(self._seed.value or 0))
 
     def _reported(self) -> Command:
         if not self._runs.value:
             raise OptionError("choose a run, or several")
-        return Command.of("report", *self._runs.value, options={"o": str(self._page)})
+        return self._report.command(*self._runs.value)
 
     def _show(self, outcome: Outcome) -> None:
-        """The page that was written, which can reach nothing of the studio."""
-        page = Path(outcome.command.arguments[-1])
-        if not (outcome.fine and page.is_file()):
-            return
-        if self._shown is not None:
-            self._shown.unlink(missing_ok=True)
-        self._shown, self._page = page, self._new_page()
-        address = escape(self._desk.address_of(page), quote=True)
-        self._report.text = (
-            f'<p><a href="{address}" target="_blank" rel="noopener">open it in a tab of its own</a></p>'
-            f'<iframe src="{address}" title="report" sandbox="allow-scripts allow-downloads"></iframe>'
-        )
-        self._play.refresh()
-        self._open.refresh()
+        """The page that was written; the next is another."""
+        if self._report.show(outcome):
+            self._play.refresh()
+            self._open.refresh()
