@@ -37,6 +37,7 @@ def _run(arguments: Sequence[str]) -> int:
     from inphase.cli.bags import bags
     from inphase.cli.demo import demo
     from inphase.cli.evaluate import evaluate
+    from inphase.cli.experiment import experiment
     from inphase.cli.fit import fit
     from inphase.cli.inspect import inspect
     from inphase.cli.live import live
@@ -61,6 +62,7 @@ def _run(arguments: Sequence[str]) -> int:
         "record": record,
         "live": live,
         "studio": studio,
+        "experiment": experiment,
     }
     # The products of a filter are small: two threads make each slower, many times so on a busy machine.
     with threadpool_limits(limits=1):
