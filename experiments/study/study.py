@@ -1,4 +1,4 @@
-"""A study: parts in their order, each of them tasks that know nothing of each other, and what is told of their results."""
+"""A study: parts in their order, each of them independent tasks, and what is told of their results."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from typing import Any, TypeAlias
 
 from experiments.study.page import Page
 from experiments.study.stored import Found, Stored
-
 from inphase.errors import OptionError, listing
 
 Task: TypeAlias = Callable[[], Mapping[str, Any]]
@@ -47,7 +46,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Study:
-    """A study of the dissertation. title: with its section. says: what it is, in a paragraph. modules: what it needs."""
+    """A study of the dissertation. title: with its section. says: what it is, in a paragraph. modules: its needs."""
 
     title: str
     says: str
