@@ -27,6 +27,7 @@ hypothesis.settings.load_profile("ci" if os.environ.get("CI") else "dev")
 
 # What takes longest begins first: a slow file that is begun last keeps one processor busy and the others waiting.
 SLOWEST = [
+    "test_experiment",
     "test_studio_browser",
     "test_examples",
     "test_report_page",

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import re
+import zipfile
+import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +18,7 @@ from inphase.io.atomic import whole_file
 Arrays: TypeAlias = Mapping[str, np.ndarray]
 Found: TypeAlias = Mapping[str, Arrays]  # by label
 MADE_BY, SECONDS = "made_by", "seconds"
-LABEL = re.compile(r"[\w.+-]+(/[\w.+-]+)*")
+LABEL = re.compile(r"\w[\w.+-]*(/\w[\w.+-]*)*")
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,8 @@ class Stored(Mapping[str, Arrays]):
     def keep(self, label: str, result: Mapping[str, Any], made_by: str, seconds: float) -> None:
         """Write a result whole, with the digest of what made it and how long that took [s]."""
         path = self.path(label)
+        if taken := {MADE_BY, SECONDS} & set(result):
+            raise ValueError(f"{min(taken)} is a name of its own")
         path.parent.mkdir(parents=True, exist_ok=True)
         arrays = {name: np.asarray(value) for name, value in result.items()}
         arrays |= {MADE_BY: np.asarray(made_by), SECONDS: np.asarray(seconds)}
@@ -56,9 +60,9 @@ class Stored(Mapping[str, Arrays]):
     def made_by(self, label: str) -> str | None:
         """The digest of what made a result; None where it is not there, or cannot be read."""
         try:
-            with np.load(self.path(label), allow_pickle=False) as file:
+            with self.path(label).open("rb") as opened, np.load(opened, allow_pickle=False) as file:
                 return str(file[MADE_BY])
-        except (OSError, KeyError, ValueError, EOFError):
+        except (OSError, KeyError, ValueError, EOFError, zlib.error, zipfile.BadZipFile):
             return None
 
 

@@ -1,0 +1,37 @@
+"""Every study's quick variant, as a reader runs it: all tables are there, and all pictures."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+STUDIES = sorted(path.parent.name for path in (ROOT / "experiments").glob("*/study.py"))
+SLOWEST_FIRST = sorted(STUDIES, key=lambda name: name == "handwriting")
+
+
+def test_there_is_a_study_for_each_of_the_dissertation():
+    assert set(STUDIES) <= {"handwriting", "catching", "hugging", "handshake", "cooperation"}
+
+
+@pytest.mark.parametrize("name", SLOWEST_FIRST)
+def test_the_quick_study_tells_everything(name, run, tmp_path):
+    if name != "handwriting":
+        pytest.importorskip("mujoco", reason="mujoco 4 needs Python 3.11")
+    folder = tmp_path / "results"
+    code, out, error = run("experiment", name, "--quick", "--jobs", "1", "-o", folder)
+    assert (code, error) == (0, "")
+    study = importlib.import_module(f"experiments.{name}.study").STUDY
+    text = (folder / f"{name}.md").read_text(encoding="utf-8")
+    for part in study.parts.values():
+        assert f"### {part.what}" in text
+    for picture in re.findall(r"!\[.+?\]\((.+?)\)", text):
+        assert (folder / picture).stat().st_size > 1000
+    assert not re.search(r"\bnan\b|\binf\b", text)
+    assert f"wrote {folder / name}.md" in out
+    # Again at once, and the same.
+    code, again, _ = run("experiment", name, "--quick", "--jobs", "1", "-o", folder)
+    assert (code, again) == (0, out)

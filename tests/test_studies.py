@@ -1,0 +1,217 @@
+"""How studies are conducted: kept as they are done, resumed, told; with tables that mark what they should."""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.study import Cell, Page, Part, Settings, Stored, Study, Table
+from experiments.study.conduct import conduct
+from experiments.study.interaction_primitive import warped
+from experiments.study.stored import digest
+from experiments.study.table import marked
+from inphase.errors import DataError, OptionError
+from inphase.workers import workers
+
+ROOT = Path(__file__).parents[1]
+
+
+def draw(label: str, diary: Path, fails: str = "") -> dict[str, object]:
+    """A task that writes down that it was done."""
+    if label == fails:
+        raise KeyboardInterrupt
+    with diary.open("a") as file:
+        file.write(label + "\n")
+    return {"numbers": np.arange(3) + len(label), "name": label}
+
+
+def study(diary: Path, labels: tuple[str, ...] = ("a", "b/1", "b/2"), fails: str = "") -> Study:
+    """Two parts, the second of which reads the first."""
+
+    def tell(settings, found, page):
+        page.say(json.dumps({label: int(result["numbers"].sum()) for label, result in found.items()}))
+
+    def later(settings):
+        return {"of": partial(count, settings.of("first"))}
+
+    return Study(
+        "A study",
+        "What it is.",
+        {
+            "first": Part("First", lambda settings: {of: partial(draw, of, diary, fails) for of in labels}, tell),
+            "second": Part(
+                "Second", later, lambda settings, found, page: page.say(str(found["of"]["count"])), ("first",)
+            ),
+            "third": Part("Third", lambda settings: {}, lambda settings, found, page: page.say("nothing")),
+        },
+        modules=(),
+    )
+
+
+def count(stored: Stored) -> dict[str, object]:
+    return {"count": len(stored), "names": [str(result["name"]) for result in stored.values()]}
+
+
+@pytest.fixture
+def settings(tmp_path):
+    return Settings(quick=False, seed=0, folder=tmp_path / "results")
+
+
+@pytest.fixture
+def diary(tmp_path):
+    (tmp_path / "diary").touch()
+    return tmp_path / "diary"
+
+
+def done(diary: Path) -> list[str]:
+    return diary.read_text().split()
+
+
+def conducted(made: Study, settings: Settings, **options) -> tuple[str, list[str]]:
+    said: list[str] = []
+    with workers(1) as team:
+        page = conduct("handwriting", made, settings, team, say=said.append, **options)
+    return page.text(), said
+
+
+def test_what_is_done_is_not_done_again(settings, diary):
+    text, _ = conducted(study(diary), settings)
+    assert done(diary) == ["a", "b/1", "b/2"]
+    assert '{"a": 6, "b/1": 12, "b/2": 12}' in text
+    again, said = conducted(study(diary), settings)
+    assert (again, said, len(done(diary))) == (text, [], 3)
+    conducted(study(diary), settings, again=True)
+    assert len(done(diary)) == 6
+
+
+def test_a_study_that_was_stopped_goes_on(settings, diary):
+    with pytest.raises(KeyboardInterrupt):
+        conducted(study(diary, fails="b/2"), settings)
+    assert done(diary) == ["a", "b/1"]
+    _, said = conducted(study(diary), settings)
+    assert done(diary) == ["a", "b/1", "b/2"]
+    assert said == ["first: 2 of 3 results are there"]
+
+
+def test_a_result_that_is_broken_or_of_other_settings_is_made_anew(settings, diary):
+    conducted(study(diary), settings)
+    path = settings.of("first").path("a")
+    path.write_bytes(path.read_bytes()[:40])
+    conducted(study(diary), settings)
+    assert done(diary)[3:] == ["a"]
+    other = Settings(quick=False, seed=1, folder=settings.folder)
+    _, said = conducted(study(diary), other, parts=("first",))
+    assert done(diary)[4:] == ["a", "b/1", "b/2"]
+    assert "3 results are of other code or settings" in said[0]
+    conducted(study(diary), settings, parts=("first",), keep=True)  # as they are
+    assert len(done(diary)) == 7
+
+
+def test_a_part_alone_has_what_it_needs_done_and_is_told_alone(settings, diary):
+    text, _ = conducted(study(diary), settings, parts=("second",))
+    assert (settings.folder / "handwriting.md").read_text().count("### ") == 1
+    assert "### Second" in text
+    assert text.endswith("\n\n3")
+    assert "--part second" in text
+    assert conducted(study(diary), settings, parts=("third",))[0].endswith("nothing")
+    with pytest.raises(OptionError, match=r"unknown part 'forth'; valid: first, second, third"):
+        conducted(study(diary), settings, parts=("forth",))
+
+
+def test_progress_goes_from_nothing_to_all(settings, diary):
+    shares: list[float] = []
+    conducted(study(diary), settings, progress=shares.append)
+    assert shares == sorted(shares)
+    assert shares[0] == pytest.approx(1 / 9)
+    assert shares[-1] <= 1.0
+
+
+def test_results_come_back_as_they_were(tmp_path):
+    stored = Stored(tmp_path)
+    given = {"x": np.array([[1.0, np.nan]]), "words": ["a", "é"], "n": 3}
+    stored.keep("deep/er", given, "me", 2.0)
+    assert list(stored) == ["deep/er"]
+    np.testing.assert_array_equal(stored["deep/er"]["x"], given["x"])
+    assert stored["deep/er"]["words"].tolist() == ["a", "é"]
+    assert stored.made_by("deep/er") == "me"
+    with pytest.raises(KeyError):
+        stored["other"]
+    for label in ("../up", "a//b", "/root", "a b", ""):
+        with pytest.raises(ValueError, match="expected a label"):
+            stored.path(label)
+
+
+def test_the_digest_tells_other_code_and_other_settings_apart(tmp_path):
+    (tmp_path / "a.py").write_text("1")
+    before = digest([tmp_path], True, 0)
+    assert digest([tmp_path], True, 0) == before
+    assert digest([tmp_path], False, 0) != before
+    (tmp_path / "b.txt").write_text("not code")
+    assert digest([tmp_path], True, 0) == before
+    (tmp_path / "a.py").write_text("2")
+    assert digest([tmp_path], True, 0) != before
+
+
+def test_a_table_marks_the_best_and_what_is_not_worse(rng):
+    good = rng.normal(1.0, 0.1, 40)
+    marks = marked({"good": good, "same": good[::-1] + 0.001, "bad": good + 1.0, "none": np.array([])})
+    assert marks == {"good": "**{}**", "same": "{} ≈", "bad": "{}", "none": "{}"}
+    table = Table("what", ["one", "two", "three"])
+    table.add("row", {"one": Cell(np.array([3.97e16])), "two": Cell(np.array([0.5])), "three": "text"}, {"two": "0.14"})
+    assert table.markdown().splitlines()[-1] == "| row | 3.97·10^16 ≈ | **0.500** (0.14) | text |"
+    with pytest.raises(ValueError, match="unknown column 'four'"):
+        table.add("row", {"four": "x"})
+
+
+def test_a_study_takes_its_place_in_a_page_and_leaves_the_rest(tmp_path):
+    page = Page("mine", tmp_path / "results")
+    page.say("new")
+    page.film([np.full((8, 8, 3), shade, np.uint8) for shade in (0, 120, 255)], "film", "a film", 10)
+    target = tmp_path / "studies.md"
+    target.write_text("before\n<!-- begin mine -->\nold\n<!-- end mine -->\nafter\n")
+    page.into(target)
+    text = target.read_text()
+    assert text == "before\n<!-- begin mine -->\nnew\n\n![a film](studies/mine-film.gif)\n<!-- end mine -->\nafter\n"
+    assert (tmp_path / "studies" / "mine-film.gif").read_bytes()[:4] == b"GIF8"
+    page.into(target)
+    assert target.read_text() == text
+    target.write_text("nothing")
+    with pytest.raises(DataError, match="<!-- begin mine -->"):
+        page.into(target)
+
+
+def test_time_warping_finds_where_each_sample_is(rng):
+    """Against the plain double loop over all paths' costs, and a pace that is known."""
+    reference = np.cumsum(rng.normal(size=(30, 2)), axis=0)
+    truth = np.cumsum(rng.integers(0, 2, 25))  # it stands, or moves on by one
+    truth -= truth[0]
+    np.testing.assert_array_equal(reference[warped(reference[truth], reference)], reference[truth])
+    rows = reference[truth] + 0.3 * rng.normal(size=(25, 2))
+    cost = ((rows[:, None] - reference[None]) ** 2).sum(2)
+    total = np.full_like(cost, np.inf)
+    for i in range(25):
+        for j in range(30):
+            ways = [total[a, b] for a, b in ((i - 1, j), (i - 1, j - 1), (i, j - 1)) if min(a, b) >= 0]
+            total[i, j] = cost[i, j] + (min(ways) if ways else 0.0)
+    path = warped(rows, reference)
+    assert path[-1] == np.argmin(total[-1])
+    assert (np.diff(path) >= 0).all()
+
+
+def test_bad_input_is_one_line(run, tmp_path):
+    code, _, error = run("experiment", "nothing")
+    assert (code, error.count("\n")) == (2, 1)
+    assert "unknown study 'nothing'; valid: " in error
+    assert "handwriting" in error
+    for more, told in (
+        (["--part", "nothing", "-o", tmp_path / "o"], "unknown part 'nothing'; valid: models, temporal"),
+        (["--quick", "--page", tmp_path / "p.md"], "expected the whole study, got --part or --quick"),
+        (["--jobs", "0"], "--jobs: expected at least 1, got 0"),
+    ):
+        code, _, error = run("experiment", "handwriting", *more)
+        assert (code, error.count("\n")) == (2, 1)
+        assert told in error
