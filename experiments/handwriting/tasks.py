@@ -40,7 +40,7 @@ def shifts(a: int | None, count: int, rng: np.random.Generator) -> np.ndarray:
 def learn(settings: Settings, a: int | None) -> Mapping[str, np.ndarray]:
     """Both models of strokes that are moved about."""
     rng = np.random.default_rng([settings.seed, LEARN, a or 0])
-    count = 8 if settings.quick else 50
+    count = 6 if settings.quick else 50
     strokes = [made(stroke() + shift, SAMPLES, NOISE, rng) for shift in shifts(a, count, rng)]
     return _both(taught(strokes, NOISE, rng))
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import inphase
 from experiments.study.page import Page
+from experiments.study.plan import Settings, Study, Task
 from experiments.study.stored import SECONDS, digest
-from experiments.study.study import Settings, Study, Task
 from inphase.errors import OptionError
 from inphase.workers import Team
 
