@@ -1,0 +1,1 @@
+"""Bodies that studies share: a robot's arm, and a person."""
