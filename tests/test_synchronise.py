@@ -278,6 +278,16 @@ def test_gaps_and_death_of_a_sensor_are_missing_in_the_whole():
     np.testing.assert_array_equal(blind[:, 1], whole.times > 1.5 + 0.061)
 
 
+def test_a_sensor_that_sees_nothing_yet_has_begun():
+    times = np.arange(101) / 50.0
+    hidden = np.where((times < 0.5) | (times > 1.5), np.nan, 1.0)[:, None]  # a ball in a hand, and in a box
+    ball = SensorRecording(AB[:1], times, hidden)
+    whole = combine({"ball": ball, "hand": SensorRecording(AB[1:], times, np.ones((101, 1)))}, rate=50.0)
+    np.testing.assert_allclose(whole.times, times)
+    assert np.isfinite(whole.values[:, 1]).all()
+    np.testing.assert_array_equal(np.isnan(whole.values[:, 0]), (times < 0.49) | (times > 1.5 + 0.061))
+
+
 def test_what_cannot_be_combined_is_told():
     one = SensorRecording(AB[:1], np.arange(100) / 50.0, np.ones((100, 1)))
     other = SensorRecording(AB[1:], 100 + np.arange(100) / 50.0, np.ones((100, 1)))

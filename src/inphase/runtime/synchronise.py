@@ -132,13 +132,17 @@ class Synchroniser:
         return MappingProxyType({name: track.clock for name, track in self._tracks.items()})
 
     def span(self, sensor: str) -> tuple[float, float]:
-        """When the first and the last sample kept of a sensor were read [s]; raises DataError where there is none."""
+        """When the first and the last sample of a sensor were taken [s], of the time that is kept.
+
+        A sensor that says that it sees nothing yet has begun. Raises DataError where nothing was ever read.
+        """
         track = self._tracks[sensor]
         if not track.stamps:
             raise DataError(f"{sensor}: expected samples, got none that could be used")
-        first, last = (track.clock.time_of(track.stamps[i]) for i in (0, -1))
+        begin, end = track.said
+        first, last = track.clock.time_of(begin), track.clock.time_of(end)
         nudge = float(np.spacing(abs(first)))
-        while track.clock.stamp_at(first) < track.stamps[0]:  # rounding: it would be before all that was read
+        while track.clock.stamp_at(first) < begin:  # rounding: it would be before all that was read
             first, nudge = first + nudge, 2 * nudge
         return first, last
 

@@ -75,6 +75,7 @@ class Track:
         self.unfetched = 0  # and how many never will be: they are older than all that is kept
         self._seen = np.full(len(signals), -inf)
         self._odd_since: float | None = None
+        self._said = (inf, -inf)  # the stamps of the first and the last sample, of those in which nothing was read, too
 
     def take(self, sample: Sample) -> Fate:
         """Put one sample in its place; raises ObservationError for one of another number of values."""
@@ -135,6 +136,12 @@ class Track:
         """Of the samples kept, increasing [s]."""
         return self._stamps
 
+    @property
+    def said(self) -> tuple[float, float]:
+        """The stamps [s] of the first and the last sample of the time that is kept, also of one that saw nothing."""
+        begin, end = self._said
+        return max(begin, min(self._stamps[0], end - self._kept)), end
+
     def _place(self, sample: Sample) -> Fate:
         stamp, received = float(sample.stamp), float(sample.received)
         if not (np.isfinite(stamp) and np.isfinite(received)):
@@ -149,6 +156,7 @@ class Track:
             self._restart()
             restarted = True
         self.clock.add(stamp, received)
+        self._said = min(self._said[0], stamp), max(self._said[1], stamp)
         values = np.where(np.isfinite(sample.values), sample.values, np.nan)
         for parts in self._quaternions:
             if np.isnan(values[parts]).any():
@@ -167,6 +175,7 @@ class Track:
         self.clock = SourceClock(self._shared, self._window)
         self._stamps, self._rows, self._fresh, self._odd_since = [], [], [], None
         self._seen[:] = -inf
+        self._said = inf, -inf
 
     def _insert(self, stamp: float, values: FloatArray) -> Fate:
         place = bisect_left(self._stamps, stamp)
