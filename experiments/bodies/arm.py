@@ -13,7 +13,7 @@ VELOCITY = np.pi  # [rad/s] that every joint can do, by the data sheet
 TORQUE = np.array([150.0, 150.0, 150.0, 28.0, 28.0, 28.0])  # [Nm]
 
 
-def add_arm(spec: Any, prefix: str = "", pos: Sequence[float] = (0, 0, 0), turned: float = 0.0) -> Any:
+def add_arm(spec: Any, prefix: str = "ur5_", pos: Sequence[float] = (0, 0, 0), turned: float = 0.0) -> Any:
     """Attach an arm to a world (mujoco.MjSpec), its names after the prefix; returns the site of its flange.
 
     pos: of its base [m]. turned: about the vertical [rad]; all joints at 0, the arm lies along the base's -x.

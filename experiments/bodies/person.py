@@ -154,18 +154,19 @@ def standing(height: float, at: Point = (0, 0), facing: float = 0.0) -> dict[str
 def bent(root: Point, end: Point, upper: float, lower: float, towards: Point) -> np.ndarray:
     """Where the joint between two segments is: an elbow or a knee, as far `towards` that direction as lengths allow.
 
-    upper, lower: of the segments [m]. An end that is out of reach stretches the limb, which is straight then.
+    root, end: (..., 3). upper, lower: of the segments [m]. An end that is out of reach stretches the limb, which is straight then.
     """
     root, end = np.asarray(root, dtype=np.float64), np.asarray(end, dtype=np.float64)
-    way = end - root
-    distance = max(float(np.linalg.norm(way)), 1e-9)
+    way, towards = end - root, np.asarray(towards, dtype=np.float64)
+    distance = np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-9)
     along = way / distance
     share = (upper**2 - lower**2 + distance**2) / (2 * distance)
-    off = np.sqrt(max(upper**2 - share**2, 0.0))
-    if not off:
-        share = distance * upper / (upper + lower)
-    side = np.asarray(towards, dtype=np.float64) - along * (along @ np.asarray(towards))
-    return np.asarray(root + along * share + side / max(np.linalg.norm(side), 1e-9) * off)
+    off = np.sqrt(np.maximum(upper**2 - share**2, 0.0))
+    share = np.where(off > 0, share, distance * upper / (upper + lower))
+    side = towards - along * (along * towards).sum(-1, keepdims=True)
+    return np.asarray(
+        root + along * share + side / np.maximum(np.linalg.norm(side, axis=-1, keepdims=True), 1e-9) * off
+    )
 
 
 def _shape(part: Any, kind: Any, colour: Point, **shape: Any) -> None:
