@@ -20,7 +20,7 @@ def as_written(dataset: inphase.Dataset, basis: Basis | Mapping[str, Basis]) -> 
     No shrinkage, no trust less than whole, no reflex, nothing held out: what chapters 2 and 3 compare.
     """
     model = inphase.fit(dataset, basis=basis, shrinkage=0.0, calibrate=False)
-    scaled = [model.scaling.scale(demonstration.values) for demonstration in dataset]
+    scaled = [model.scaling.scale(model.coordinates.from_channels(demonstration.values)) for demonstration in dataset]
     left = residuals(model.layout, [d.phases for d in dataset], scaled, model.prior.samples)
     var = regression_noise([d.times for d in dataset], left).var
     return replace(model, prior=replace(model.prior, trust=1.0), noise=Noise(var, np.zeros(len(var))), reflex=None)
