@@ -154,7 +154,7 @@ def standing(height: float, at: Point = (0, 0), facing: float = 0.0) -> dict[str
 def bent(root: Point, end: Point, upper: float, lower: float, towards: Point) -> np.ndarray:
     """Where the joint between two segments is: an elbow or a knee, as far `towards` that direction as lengths allow.
 
-    root, end: (..., 3). upper, lower: of the segments [m]. An end that is out of reach stretches the limb, which is straight then.
+    root, end: (..., 3). upper, lower: of the segments [m]. A limb whose end is out of reach is stretched, and straight.
     """
     root, end = np.asarray(root, dtype=np.float64), np.asarray(end, dtype=np.float64)
     way, towards = end - root, np.asarray(towards, dtype=np.float64)
