@@ -65,7 +65,9 @@ KINDS = {
         np.full(8, 8.0),
     ),
     "head": Kind(_signals([f"head_q{axis}" for axis in "xyzw"], ""), 60.0, 0.015, np.full(3, 0.010), np.full(3, 0.02)),
-    "ball": Kind(_signals([f"ball_{axis}" for axis in "xyz"], "m"), 90.0, 0.025, np.full(3, 8e-3), np.full(3, 5e-3), 0.03),
+    "ball": Kind(
+        _signals([f"ball_{axis}" for axis in "xyz"], "m"), 90.0, 0.025, np.full(3, 0.008), np.full(3, 0.005), lost=0.03
+    ),
     "joints": Kind(_signals(list(JOINTS), "rad"), 125.0, 0.0, np.full(6, 2e-4), np.zeros(6)),
 }  # fmt: skip
 MODALITIES = ("body", "imu", "shoes", "head", "ball")

@@ -94,6 +94,7 @@ class World:
         self.data = mujoco.MjData(self.model)
         self.target = np.array(start)
         self.entered: float | None = None  # [s] when the ball came through the opening
+        self.nearest = np.inf  # [m] that the ball came to the middle of the opening
         self.log: list[Moment] = []
         self._held = True
         self._ball = self.model.joint("ball")
@@ -151,8 +152,9 @@ class World:
             velocity = self.data.qvel[self._v : self._v + 3]
             self.data.xfrc_applied[self._body, :3] = -DRAG * np.sqrt(velocity @ velocity) * velocity
         mujoco.mj_step(self.model, self.data)
-        if self.entered is None and not self._held and self.inside:
-            self.entered = self.time
+        if self.entered is None and not self._held:
+            self.nearest = min(self.nearest, float(np.linalg.norm(self.ball - self.opening[0])))
+            self.entered = self.time if self.inside else None
         self._note()
 
     def show(self) -> None:
