@@ -195,6 +195,21 @@ def test_what_is_held_out_is_explained_by_the_others_as_a_filter_would(rng: np.r
     np.testing.assert_allclose(longer.noise.correlation_time, 3 * held_out.noise.correlation_time)
 
 
+def test_where_nothing_was_seen_nothing_counts(rng: np.random.Generator) -> None:
+    layout, shown = Layout((Gaussian(20, 0.02), Gaussian(4), Gaussian(4))), np.array([1.0, 1.0, 0.0])
+    weights = rng.normal(size=(7, layout.size))
+    seen = np.ones((7, 200, 3), dtype=bool)
+    seen[:, :100, 0] = False  # a ball before it is thrown
+    seen[3, :, 0] = False  # and one that no camera saw
+    filled = weights.copy()
+    filled[:, :6] += 9 * rng.normal(size=(7, 6))  # what stands in for readings, up to a phase of a third
+    one, other = (leave_one_out(layout, w, shown, 2.0, seen) for w in (weights, filled))
+    np.testing.assert_allclose(other.noise.var, one.noise.var, rtol=1e-6)
+    np.testing.assert_allclose(other.noise.correlation_time, one.noise.correlation_time, rtol=1e-6)
+    assert other.trust == pytest.approx(one.trust, rel=1e-6)
+    assert leave_one_out(layout, filled, shown, 2.0).noise.var[0] > 10 * one.noise.var[0]
+
+
 @pytest.mark.parametrize("related", [True, False])
 def test_a_partner_is_trusted_as_far_as_it_tells(related: bool, rng: np.random.Generator) -> None:
     layout = Layout((Polynomial(1), Polynomial(1)))

@@ -7,16 +7,20 @@ only noise, Eq. 2.15 makes every filter trust its partner far too much (DESIGN 4
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
 
+from inphase.arrays import frozen
 from inphase.basis import Layout
+from inphase.basis.gap import unseen
 from inphase.noise import Noise
 from inphase.training.noise import SMALLEST_STD, correlation_time
 
 GRID = 200  # phases at which curves are compared
+GRID_PHASES = frozen((np.arange(GRID) + 0.5) / GRID)
 ROUNDS = 50  # at most: the noise decides how far the others are bent, which decides the noise …
 SETTLED = 0.01  # … until it moves by less than this share
 
@@ -37,50 +41,76 @@ def leave_one_out(
     weights: Float[np.ndarray, "N B"],
     shown: Float[np.ndarray, " F"],
     duration: float,
-    seen: Bool[np.ndarray, "N F"] | None = None,
+    seen: Bool[np.ndarray, "N P F"] | None = None,
 ) -> HeldOut:
     """How each demonstration differs from what the others make of its observed partner.
 
     shown: (F,) 1 for the features of the observed partner, 0 for those of the controlled one, which are explained by
-    what the observed ones say. duration: of a typical interaction [s]. seen: (N, F) whether a demonstration has the
-    feature at all; curves that stand in for one prove nothing.
+    what the observed ones say. duration: of a typical interaction [s]. seen: whether a demonstration had readings of
+    the feature around each phase of `GRID_PHASES`; curves that stand in for readings prove nothing.
     """
-    grid = (np.arange(GRID) + 0.5) / GRID
-    curves = np.stack([layout.predict(grid, w) for w in weights])
-    var = np.maximum(curves.var(0).mean(0), SMALLEST_STD**2)
+    curves = np.stack([layout.predict(GRID_PHASES, w) for w in weights])
+    known = np.ones(curves.shape, dtype=bool) if seen is None else seen
+    count = np.maximum(known.sum((0, 1)), 1)
+    off = (curves - (curves * known).sum(0) / np.maximum(known.sum(0), 1)) * known
+    var = np.maximum((off**2).sum((0, 1)) / count, SMALLEST_STD**2)
     hidden, spread_var = shown == 0, var
-    known = np.ones(curves.shape) if seen is None else np.broadcast_to(seen[:, None, :], curves.shape).astype(float)
     for _ in range(ROUNDS):
-        target, explained = _by_the_others(curves, shown, var)
+        target, explained = _by_the_others(curves, shown, var, known)
         # The factor that makes the explanation of the hidden features fit best, all demonstrations together.
         said, true = (explained * known)[..., hidden], target[..., hidden]
         agreed = float((said * true / spread_var[hidden]).sum())
         trust = float(np.clip(agreed / max(float((said**2 / spread_var[hidden]).sum()), 1e-300), 0.0, 1.0))
         left = target - np.where(hidden, trust, 1.0) * explained
-        before, var = var, np.maximum((left**2 * known).sum((0, 1)) / known.sum((0, 1)), SMALLEST_STD**2)
+        before, var = var, np.maximum((left**2 * known).sum((0, 1)) / count, SMALLEST_STD**2)
         if (np.abs(var - before) < SETTLED * before).all():
             break
-    lasting = np.array([correlation_time(duration * grid, curve) for curve in left])
-    return HeldOut(Noise(var, (lasting * known[:, 0]).sum(0) / known[:, 0].sum(0)), trust)
+    times = duration * GRID_PHASES
+    lasting = np.array(
+        [correlation_time(times, np.where(k, curve, np.nan)) for k, curve in zip(known, left, strict=True)]
+    )
+    whole = np.maximum((~np.isnan(lasting)).sum(0), 1)
+    return HeldOut(Noise(var, np.nansum(lasting, 0) / whole), trust)
+
+
+def seen_around(
+    phases: Sequence[Float[np.ndarray, " _"]], values: Sequence[Float[np.ndarray, "_ F"]], periodic: bool
+) -> Bool[np.ndarray, "N P F"]:
+    """(N, P, F) whether each demonstration has readings of a feature around each phase of `GRID_PHASES`."""
+    found = np.ones((len(values), GRID, values[0].shape[1]), dtype=bool)
+    for around, p, v in zip(found, phases, values, strict=True):
+        missing = np.isnan(v)
+        for feature in np.flatnonzero(missing.any(0)):
+            around[:, feature] = ~np.isin(GRID_PHASES, unseen(p[~missing[:, feature]], periodic, GRID_PHASES))
+    return found
 
 
 def _by_the_others(
-    curves: Float[np.ndarray, "N P F"], shown: Float[np.ndarray, " F"], noise_var: Float[np.ndarray, " F"]
+    curves: Float[np.ndarray, "N P F"],
+    shown: Float[np.ndarray, " F"],
+    noise_var: Float[np.ndarray, " F"],
+    known: Bool[np.ndarray, "N P F"],
 ) -> tuple[Float[np.ndarray, "N P F"], Float[np.ndarray, "N P F"]]:
     """Every curve less the others' mean, and the part of it that the others' directions explain.
 
     The fit is the filters' own at a known phase: unit priors on the directions of the others (Eq. 2.14), and noise
-    that is correlated for so long that a whole curve says no more than one reading.
+    that is correlated for so long that a whole curve says no more than one reading. All of it is in products of one
+    curve with another, which are taken once: what one demonstration did not see is taken away from them.
     """
-    precision = shown / noise_var / curves.shape[1]
-    target, explained = np.empty_like(curves), np.empty_like(curves)
-    for i in range(len(curves)):
-        others = np.delete(curves, i, axis=0)
-        mean = others.mean(0)
-        directions = (others - mean) / np.sqrt(max(len(others) - 1, 1))
-        flat = directions.reshape(len(others), -1)
-        weighted = (directions * precision).reshape(len(others), -1)
-        target[i] = curves[i] - mean
-        coordinates = np.linalg.solve(weighted @ flat.T + np.eye(len(others)), weighted @ target[i].ravel())
-        explained[i] = (coordinates @ flat).reshape(mean.shape)
-    return target, explained
+    count, size = len(curves), max(len(curves) - 2, 1)
+    flat = (curves - curves.mean(0)).reshape(count, -1)
+    precision = np.broadcast_to(shown / noise_var / curves.shape[1], curves.shape[1:]).ravel()
+    products = (flat * precision) @ flat.T
+    shares = np.zeros((count, count))  # of every curve in the explanation of another
+    for i in range(count):
+        others = np.arange(count) != i
+        blind = np.flatnonzero(~known[i].ravel() & (precision > 0))
+        own = products - (flat[:, blind] * precision[blind]) @ flat[:, blind].T if len(blind) else products
+        among, towards = own[np.ix_(others, others)], own[others, i]
+        mean = among.mean(0)
+        towards = towards - mean - towards.mean() + mean.mean()  # of deviations from the others' mean
+        among = (among - mean - mean[:, None] + mean.mean()) / size
+        coordinates = np.linalg.solve(among + np.eye(count - 1), towards) / size
+        shares[i, others] = coordinates - coordinates.mean()
+    target = count / max(count - 1, 1) * flat  # less the mean of the others: the mean of all is zero
+    return target.reshape(curves.shape), (shares @ flat).reshape(curves.shape)

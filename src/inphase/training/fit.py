@@ -21,7 +21,7 @@ from inphase.tempo import Tempo
 from inphase.training.active import windows
 from inphase.training.calibrate import FEWEST, Alternative
 from inphase.training.calibrate import calibrate as calibrated
-from inphase.training.discrepancy import leave_one_out
+from inphase.training.discrepancy import leave_one_out, seen_around
 from inphase.training.noise import both, regression_noise
 from inphase.training.reflex import learn_reflex
 from inphase.training.selection import select_basis
@@ -150,8 +150,8 @@ def _learn(
     weights, _ = fit_weights(layout, phases, scaled, names=coordinates.names)
     shown = [dataset.channels[positions[0]].role is Role.OBSERVED for positions in coordinates.channel_of]
     if noise is None or prior is None:
-        duration, seen = 1 / phase.nominal_velocity, np.array([np.isfinite(curve).any(0) for curve in scaled])
-        left_out = leave_one_out(layout, weights, np.array(shown, dtype=np.float64), duration, seen)
+        seen = seen_around(phases, scaled, phase.periodic)
+        left_out = leave_one_out(layout, weights, np.array(shown, dtype=float), 1 / phase.nominal_velocity, seen)
         noise = noise or both(regression_noise(times, residuals(layout, phases, scaled, weights)), left_out.noise)
         partner, blocks = layout.slices[shown.index(False)].start, tuple(basis.size for basis in layout.bases)
         prior = prior or WeightPrior(weights, trust=left_out.trust, partner=partner, blocks=blocks)
