@@ -36,7 +36,7 @@ def chosen_basis(dataset: inphase.Dataset) -> dict[str, Basis]:
 
 
 def methods(train: inphase.Dataset, calibrate: bool) -> dict[str, tuple[inphase.Model, dict[str, Any]]]:
-    """The dissertation's methods on its own model, with as many members as demonstrations, and ours on what `fit` gives."""
+    """The dissertation's methods on its own model, with as many members as demonstrations, and ours on `fit`."""
     written = as_written(train, chosen_basis(train))
     ours = inphase.fit(train, calibrate=calibrate)
     every = len(train)
@@ -75,7 +75,7 @@ def cross_validated(
                 session.reset()
                 marks = np.union1d(MARKS, COURSE) if column == "All" else np.array(MARKS)
                 told = dict(foreseen(session, demonstration, channels_of(*modalities), marks))
-                errors = {phase: _errors(catch, demonstration, test) for phase, catch in told.items()}
+                errors = {phase: errors_of(catch, demonstration, test.names) for phase, catch in told.items()}
                 for i, what in enumerate(("joints", "ball")):
                     key = f"{what}/{column}/{method}"
                     results.setdefault(key, []).append([errors[mark][i] for mark in MARKS])
@@ -108,9 +108,9 @@ def truth(demonstration: Demonstration, names: Sequence[str]) -> np.ndarray:
     return np.array([column[np.isfinite(column)][-1] for column in values.T])
 
 
-def _errors(catch: np.ndarray, demonstration: Demonstration, test: inphase.Dataset) -> tuple[float, float]:
+def errors_of(catch: np.ndarray, demonstration: Demonstration, names: Sequence[str]) -> tuple[float, float]:
     """The mean squared error of the first three joints [rad²], and the mean absolute one of the ball [m]."""
-    off = catch - truth(demonstration, test.names)
+    off = catch - truth(demonstration, names)
     return float(np.mean(off[3 : 3 + FIRST] ** 2)), float(np.mean(np.abs(off[:3])))
 
 

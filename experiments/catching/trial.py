@@ -15,7 +15,20 @@ from experiments.catching.flight import crossing
 from experiments.catching.sensors import MODALITIES, watches
 from experiments.catching.thrower import AIM_AT, Throw
 from experiments.catching.world import World
-from inphase.runtime import Clock, Command, Conduct, FakeClock, Journal, Limits, Loop, Play, Rates, Sample, Sight, Signal
+from inphase.runtime import (
+    Clock,
+    Command,
+    Conduct,
+    FakeClock,
+    Journal,
+    Limits,
+    Loop,
+    Play,
+    Rates,
+    Sample,
+    Sight,
+    Signal,
+)
 
 RATE = 60.0  # [1/s] of all that the loop does, as in 3.4.1
 SETTLES = 0.5  # [s] after which a ball that is in the box stays there
@@ -59,8 +72,12 @@ class Arm:
 
 @dataclass(frozen=True)
 class Outcome:
-    """caught: whether the ball was in the box in the end. reachable: whether who knows the throw would catch it. missed:
-    [m] from the ball to the middle of the opening as it passed. phase: where the loop believed to be then."""
+    """What came of a throw.
+
+    caught: whether the ball was in the box in the end. reachable: whether who knows the throw would catch it. missed:
+    [m] from the ball to the middle of the opening, at the nearest. phase: where the loop believed to be then. states:
+    why the loop's states changed.
+    """
 
     world: World
     caught: bool
@@ -86,7 +103,7 @@ def played(
     session: inphase.Session, number: int, condition: str, seed: int, *, purpose: int = TESTED, seen: bool = False,
     watching: Any = None,
 ) -> Outcome:  # fmt: skip
-    """That throw, under that condition, with a loop of its own. watching: is called with the world 60 times a second."""
+    """That throw, under that condition, with a loop of its own. watching: is told world and loop 60 times a second."""
     happens, rng = thrown(seed, number, purpose)
     world, clock = World(happens, seen=seen), FakeClock()
     journal = Journal()
@@ -135,4 +152,3 @@ def tried(model: inphase.Model, condition: str, numbers: range, seed: int, purpo
         "phase": np.array([o.phase for o in outcomes]),
         "held": np.array([sum("HOLD" in s for s in o.states) for o in outcomes]),
     }
-
