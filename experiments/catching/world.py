@@ -50,7 +50,7 @@ def built(height: float | None = None) -> Any:
     )
     if height is not None:
         Person(spec, height=height)
-    add_camera(spec, "side", at=(1.75, -4.3, 1.75), to=(1.80, 0, 1.12), fovy=42)
+    add_camera(spec, "side", at=(1.55, -3.7, 2.2), to=(1.80, 0, 1.08), fovy=44)
     add_camera(spec, "robot", at=(-1.9, -1.2, 2.0), to=(1.3, 0.05, 1.0), fovy=48)
     return spec.compile()
 
@@ -60,7 +60,7 @@ STANDS_FAR = 6.0  # [m]: where the ball lies before it is held
 
 def _add_box(flange: Any) -> None:
     """Five boards on the flange, the opening away from it, and the site `opening` in its middle, z out of the box."""
-    half, cardboard = WIDTH / 2, [0.80, 0.62, 0.40, 1]
+    half, cardboard = WIDTH / 2, [0.80, 0.62, 0.40, 0.6]
     holder = flange.parent
     turn = {"pos": list(flange.pos), "quat": list(flange.quat)}
     box = holder.add_body(name="box", **turn)
