@@ -17,7 +17,7 @@ def add_room(spec: Any, tile: float = 0.5) -> None:
     spec.add_texture(name="sky", rgb1=[0.93, 0.95, 0.97], rgb2=[0.72, 0.78, 0.84], width=256, height=256, **sky)
     tiles = {"type": mujoco.mjtTexture.mjTEXTURE_2D, "builtin": mujoco.mjtBuiltin.mjBUILTIN_CHECKER}
     spec.add_texture(name="tiles", rgb1=pale, rgb2=paler, width=256, height=256, **tiles)
-    material = spec.add_material(name="floor", texrepeat=[0.5 / tile] * 2, texuniform=True, reflectance=0.05)
+    material = spec.add_material(name="floor", texrepeat=[0.5 / tile] * 2, texuniform=True)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "tiles"
     spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[20, 20, 0.1], material="floor")
     spec.worldbody.add_light(pos=[2, -3, 5], dir=[-0.1, 0.5, -1], diffuse=[0.45] * 3, castshadow=True)

@@ -43,14 +43,14 @@ def built(height: float | None = None) -> Any:
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
         size=[RADIUS, 0, 0],
         mass=MASS,
-        rgba=[0.95, 0.55, 0.05, 1],
+        rgba=[0.85, 0.10, 0.10, 1],
         condim=6,
         friction=[0.8, 0.02, 0.01],
         solref=[0.02, 0.9],  # soft: it hardly bounces
     )
     if height is not None:
         Person(spec, height=height)
-    add_camera(spec, "side", at=(1.55, -3.7, 2.2), to=(1.80, 0, 1.08), fovy=44)
+    add_camera(spec, "side", at=(1.55, -3.7, 1.9), to=(1.80, 0, 1.2), fovy=44)
     add_camera(spec, "robot", at=(-1.9, -1.2, 2.0), to=(1.3, 0.05, 1.0), fovy=48)
     return spec.compile()
 
@@ -60,7 +60,7 @@ STANDS_FAR = 6.0  # [m]: where the ball lies before it is held
 
 def _add_box(flange: Any) -> None:
     """Five boards on the flange, the opening away from it, and the site `opening` in its middle, z out of the box."""
-    half, cardboard = WIDTH / 2, [0.80, 0.62, 0.40, 0.6]
+    half, cardboard = WIDTH / 2, [0.80, 0.62, 0.40, 0.45]
     holder = flange.parent
     turn = {"pos": list(flange.pos), "quat": list(flange.quat)}
     box = holder.add_body(name="box", **turn)
