@@ -52,11 +52,11 @@ def test_an_aimed_ball_arrives_and_is_found_where_it_passes() -> None:
     begin, target = np.array([3.0, 0.1, 1.0]), np.array([0.6, -0.4, 0.9])
     velocity = flight.aimed(begin, target, 0.95)
     np.testing.assert_allclose(flight.fly(begin, velocity, 0.95)[0], target, atol=1e-4)
-    passed = flight.crossing(begin, velocity, 0.6)
+    passed = flight.crossing(begin, velocity, lambda place: place[0] - 0.6)
     assert passed is not None
     assert passed[0] == pytest.approx(0.95, abs=1e-3)
     np.testing.assert_allclose(passed[1], target, atol=1e-3)
-    assert flight.crossing(begin, -velocity, 0.6) is None
+    assert flight.crossing(begin, -velocity, lambda place: place[0] - 0.6) is None
 
 
 def test_the_simulated_ball_flies_as_it_was_thrown(caught: tuple[thrower.Throw, World]) -> None:

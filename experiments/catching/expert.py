@@ -10,10 +10,12 @@ import numpy as np
 
 from experiments.bodies.arm import JOINTS, VELOCITY
 from experiments.catching.flight import crossing
-from experiments.catching.thrower import AIM_AT, Throw
-from experiments.catching.world import HOME, World, built
+from experiments.catching.thrower import Throw
+from experiments.catching.world import HOME, STAND, World, built
 
 LAG = 0.04  # [s] by which the arm is late: who guides it by hand does not see that
+SHOULDER = np.array([0.0, 0.0, STAND + 0.16])  # [m] of the arm
+LENGTH = 0.72  # [m] from there to the box's opening: how far people stretch an arm that they guide
 NEAR = 0.01  # [m] to where the box is wanted: as near is there
 FASTEST = 0.95 * VELOCITY
 
@@ -39,9 +41,10 @@ class Plan:
 def plan(throw: Throw, rng: np.random.Generator) -> Plan | None:
     """How to catch that throw; None where the ball does not come within reach, or too soon.
 
-    The box goes where the ball comes through a plane before the robot, its opening towards it.
+    The box goes where the ball comes within arm's length, its opening towards it.
     """
-    came = crossing(throw.position, throw.velocity, AIM_AT + rng.normal(0, 0.015))
+    length = LENGTH + rng.normal(0, 0.015)
+    came = crossing(throw.position, throw.velocity, lambda place: float(np.linalg.norm(place - SHOULDER)) - length)
     if came is None:
         return None
     time, place, velocity = came

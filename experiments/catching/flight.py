@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 GRAVITY = 9.81
@@ -40,17 +42,22 @@ def aimed(position: np.ndarray, target: np.ndarray, duration: float) -> np.ndarr
     return np.asarray(velocity)
 
 
-def crossing(position: np.ndarray, velocity: np.ndarray, x: float) -> tuple[float, np.ndarray, np.ndarray] | None:
-    """When [s], where and how fast a ball that flies to smaller x passes through a plane; None where it does not."""
-    p, v = np.array(position, dtype=np.float64), np.array(velocity, dtype=np.float64)
-    time, dt = 0.0, 0.02
-    while p[0] > x and time < 3.0:
-        last = p, v
-        p, v = fly(p, v, dt, 2)
-        time += dt
-    if p[0] > x or time == 0.0:
+def crossing(
+    position: np.ndarray, velocity: np.ndarray, ahead: Callable[[np.ndarray], float], longest: float = 2.0
+) -> tuple[float, np.ndarray, np.ndarray] | None:
+    """When [s], where and how fast a ball passes a surface; None where it does not.
+
+    ahead: (3,) → how far a place is before the surface [m]. longest: [s] that the ball is followed.
+    """
+    p, v, dt = np.array(position, dtype=np.float64), np.array(velocity, dtype=np.float64), 0.02
+    far = ahead(p)
+    if far <= 0:
         return None
-    back = (p[0] - x) / min(v[0], -0.1)
-    time -= dt
-    p, v = fly(*last, dt - back, 2)
-    return time + dt - back, p, v
+    for step in range(round(longest / dt)):
+        then, faster = fly(p, v, dt, 2)
+        left = ahead(then)
+        if left <= 0:
+            part = dt * far / (far - left)
+            return step * dt + part, *fly(p, v, part, 2)
+        p, v, far = then, faster, left
+    return None

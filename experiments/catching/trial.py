@@ -93,7 +93,7 @@ def options(condition: str, throw: Throw) -> dict[str, dict[str, float]]:
     if condition == "shoes and IMU lost in mid-throw":
         chosen = {name: {"silent": LOST_AT * throw.release} for name in chosen}
     if "hidden" in chosen.get("ball", {}):
-        came = crossing(throw.position, throw.velocity, AIM_AT)
+        came = crossing(throw.position, throw.velocity, lambda place: float(place[0]) - AIM_AT)
         flight = 1.0 if came is None else came[0]
         chosen["ball"]["hidden"] = throw.release + chosen["ball"]["hidden"] * flight
     return chosen
@@ -120,6 +120,7 @@ def played(
         journal=journal,
     )
     session.reset(number)
+    session.observe(0.0, np.full(len(session.model.observed), np.nan))  # the interaction begins, seen or not
     falls = happens.release + 1.7
     phase = [0.0]
 

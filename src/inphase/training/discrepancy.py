@@ -95,17 +95,19 @@ def _by_the_others(
 
     The fit is the filters' own at a known phase: unit priors on the directions of the others (Eq. 2.14), and noise
     that is correlated for so long that a whole curve says no more than one reading. All of it is in products of one
-    curve with another, which are taken once: what one demonstration did not see is taken away from them.
+    curve with another, which are taken once for what most saw; where a demonstration saw more or less is added to them.
     """
     count, size = len(curves), max(len(curves) - 2, 1)
     flat = (curves - curves.mean(0)).reshape(count, -1)
     precision = np.broadcast_to(shown / noise_var / curves.shape[1], curves.shape[1:]).ravel()
-    products = (flat * precision) @ flat.T
+    usual = known.mean(0).ravel() > 0.5
+    products = (flat * (precision * usual)) @ flat.T
     shares = np.zeros((count, count))  # of every curve in the explanation of another
     for i in range(count):
         others = np.arange(count) != i
-        blind = np.flatnonzero(~known[i].ravel() & (precision > 0))
-        own = products - (flat[:, blind] * precision[blind]) @ flat[:, blind].T if len(blind) else products
+        more = known[i].ravel().astype(np.float64) - usual
+        unlike = np.flatnonzero(more * precision)
+        own = products + (flat[:, unlike] * (more * precision)[unlike]) @ flat[:, unlike].T
         among, towards = own[np.ix_(others, others)], own[others, i]
         mean = among.mean(0)
         towards = towards - mean - towards.mean() + mean.mean()  # of deviations from the others' mean
