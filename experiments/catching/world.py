@@ -18,9 +18,8 @@ from experiments.catching.thrower import Throw
 STAND = 0.60  # [m] from the floor to the arm's base
 WIDTH, DEPTH, WALL = 0.32, 0.20, 0.005  # of the box [m], 32 cm wide as in 3.4.1
 STEP = 0.002  # [s]
-HOME = np.array(
-    [-0.333, -1.218, 2.376, -2.112, 1.373, -1.301]
-)  # the box waits before the robot, its opening forward and up
+# The box waits before the robot, its opening forward and up.
+HOME = np.array([-0.297, -1.202, 2.233, -1.980, 1.394, -1.331])
 
 
 @lru_cache(maxsize=2)
