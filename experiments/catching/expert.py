@@ -15,7 +15,7 @@ from experiments.catching.world import HOME, STAND, World, built
 
 LAG = 0.04  # [s] by which the arm is late: who guides it by hand does not see that
 SHOULDER = np.array([0.0, 0.0, STAND + 0.16])  # [m] of the arm
-LENGTH = 0.72  # [m] from there to the box's opening: how far people stretch an arm that they guide
+LENGTH = 0.80  # [m] from there to the box's opening: how far people stretch an arm that they guide
 NEAR = 0.01  # [m] to where the box is wanted: as near is there
 FASTEST = 0.95 * VELOCITY
 

@@ -79,7 +79,7 @@ def style(rng: np.random.Generator) -> Style:
 
 def throw(who: Style, rng: np.random.Generator) -> Throw:
     """One throw: an aim, a wind-up for it that is never twice the same, and an arm and fingers that miss a little."""
-    target = np.array([AIM_AT, np.clip(rng.normal(0, 0.34), -0.8, 0.8), rng.uniform(0.80, 1.20)])
+    target = np.array([AIM_AT, np.clip(rng.normal(0, 0.30), -0.6, 0.6), rng.uniform(0.80, 1.20)])
     flight = float(np.clip(rng.normal(who.flight, 0.06), 0.72, 1.15))
     wild = _Wild(
         lead=rng.uniform(0.0, 0.12),

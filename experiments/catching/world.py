@@ -19,7 +19,7 @@ STAND = 0.60  # [m] from the floor to the arm's base
 WIDTH, DEPTH, WALL = 0.32, 0.20, 0.005  # of the box [m], 32 cm wide as in 3.4.1
 STEP = 0.002  # [s]
 # The box waits before the robot, its opening forward and up.
-HOME = np.array([-0.297, -1.202, 2.233, -1.980, 1.394, -1.331])
+HOME = np.array([-0.264, -1.116, 2.077, -1.905, 1.413, -1.357])
 
 
 @lru_cache(maxsize=2)
