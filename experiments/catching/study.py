@@ -19,8 +19,8 @@ MEMBERS = (10, 25, 50, 80, 120, 198)
 
 
 def _demonstrations(settings: Settings) -> dict[str, Task]:
-    count = 42 if settings.quick else DEMONSTRATIONS
-    chunk = 14 if settings.quick else CHUNK
+    count = 36 if settings.quick else DEMONSTRATIONS
+    chunk = 18 if settings.quick else CHUNK
     return {
         f"from-{begin:03d}": task(make, settings.seed, range(begin, min(begin + chunk, count)))
         for begin in range(0, count, chunk)
@@ -29,14 +29,14 @@ def _demonstrations(settings: Settings) -> dict[str, Task]:
 
 def _prediction(settings: Settings) -> dict[str, Task]:
     found = settings.of("demonstrations")
-    count, most = (1, 4) if settings.quick else (FOLDS, None)
+    count, most = (1, 3) if settings.quick else (FOLDS, None)
     whole = partial(cross_validated, found, FOLDS, seed=settings.seed, calibrate=not settings.quick, most=most)
     return {f"fold-{fold}": task(whole, fold=fold) for fold in range(count)}
 
 
 def _trade_off(settings: Settings) -> dict[str, Task]:
-    members = (10, 37) if settings.quick else MEMBERS
-    tests = 3 if settings.quick else 22
+    members = (10, 32) if settings.quick else MEMBERS
+    tests = 2 if settings.quick else 22
     found = settings.of("demonstrations")
     return {f"members-{n:03d}": task(by_members, found, n, FOLDS, settings.seed, tests) for n in members}
 
@@ -47,7 +47,7 @@ def _model(settings: Settings) -> dict[str, Task]:
 
 def _catching(settings: Settings) -> dict[str, Task]:
     models = settings.of("model")
-    throws, chunk = (2, 2) if settings.quick else (THROWS, 20)
+    throws, chunk = (1, 1) if settings.quick else (THROWS, 20)
     tasks: dict[str, Task] = {}
     for i, condition in enumerate(CONDITIONS):
         for begin in range(0, throws, chunk):
