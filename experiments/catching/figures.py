@@ -81,7 +81,7 @@ def belief(part: Mapping[str, np.ndarray]) -> Figure:
 
 def strip(found: Found) -> Figure:
     """Four frames of every throw: the wind-up, the release, the flight and the catch (Fig. 30)."""
-    figure, rows = _figure(len(found), 4, (11, 2.0 * len(found)))
+    figure, rows = _figure(len(found), 4, (11, 2.2 * len(found) + 0.2))
     for panels, part in zip(np.atleast_2d(rows), found.values(), strict=True):
         frames, end = part["frames"], float(part["entered"])
         end = end if np.isfinite(end) else float(part["times"][-1])
