@@ -35,6 +35,7 @@ def led(plan: Plan) -> np.ndarray:
     configuration.update(np.array(READY))
     tool = mink.FrameTask("pinch", "site", position_cost=1.0, orientation_cost=0.3, lm_damping=1e-3)
     still = mink.DampingTask(model, cost=1e-2)
+    limits = [mink.ConfigurationLimit(model)]
     times = np.arange(0.0, plan.duration, 1 / RATE)
     found = np.empty((len(times), 6))
     for i, time in enumerate(times):
@@ -42,8 +43,8 @@ def led(plan: Plan) -> np.ndarray:
         at = np.array([x, y, z])
         turned = mink.SO3.from_matrix(frame(at, pitch, plan.place))
         tool.set_target(mink.SE3.from_rotation_and_translation(turned, at))
-        for _ in range(60 if i == 0 else 2):
-            velocity = mink.solve_ik(configuration, [tool, still], 1 / RATE, solver="daqp", damping=1e-6)
+        for _ in range(60 if i == 0 else 1):
+            velocity = mink.solve_ik(configuration, [tool, still], 1 / RATE, "daqp", damping=1e-6, limits=limits)
             configuration.integrate_inplace(velocity, 1 / RATE)
         found[i] = configuration.q
     return found

@@ -7,7 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 PEOPLE = 5
-SHIRTS = ((0.80, 0.33, 0.25, 1), (0.25, 0.47, 0.42, 1), (0.44, 0.35, 0.60, 1), (0.83, 0.58, 0.20, 1), (0.27, 0.42, 0.66, 1))
+SHIRTS = (
+    (0.80, 0.33, 0.25, 1),
+    (0.25, 0.47, 0.42, 1),
+    (0.44, 0.35, 0.60, 1),
+    (0.83, 0.58, 0.20, 1),
+    (0.27, 0.42, 0.66, 1),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +79,9 @@ class Track:
 class Sway:
     """The small slow movement of a body that nobody keeps still. sizes: (D,) standard deviations [m]."""
 
-    def __init__(self, sizes: list[float], rng: np.random.Generator, slowest: float = 0.1, fastest: float = 1.0) -> None:
+    def __init__(
+        self, sizes: list[float], rng: np.random.Generator, slowest: float = 0.1, fastest: float = 1.0
+    ) -> None:
         waves = 6
         self._rates = 2 * np.pi * np.exp(rng.uniform(np.log(slowest), np.log(fastest), (waves, 1)))
         self._sines = np.asarray(sizes) * rng.standard_normal((waves, len(sizes))) / np.sqrt(waves)

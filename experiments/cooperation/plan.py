@@ -25,6 +25,7 @@ class Plan:
 
     place: Place
     person: Someone
+    back: float  # how much of bending down the back does
     duration: float
     thing: np.ndarray
     palms: Way
@@ -32,6 +33,7 @@ class Plan:
     feet: Way
     grip: Way
     holds: tuple[float, float]
+    waits: float
     tool: Way
     closed: Way
 
@@ -83,7 +85,19 @@ def _handover(person: Someone, rng: np.random.Generator) -> Plan:
     back = given + 0.16 * _out(given, HANDOVER) + [0, 0, 0.03]
     tool = Track(
         [t[2], t[3], t[4], t[5], t[6], t[7], t[9], t[10]],
-        [[*p, a] for p, a in ((begin, 1.0), (before, 0.9), (at, 0.8), (at, 0.8), (lifted, 0.7), (given, 0.4), (given, 0.4), (back, 0.4))],
+        [
+            [*p, a]
+            for p, a in (
+                (begin, 1.0),
+                (before, 0.9),
+                (at, 0.8),
+                (at, 0.8),
+                (lifted, 0.7),
+                (given, 0.4),
+                (given, 0.4),
+                (back, 0.4),
+            )
+        ],
     )
     closed = Track([t[4], t[5], t[8] + 0.1, t[9]], [[0.0], [1.0], [1.0], [0.0]])
     sway, wobble = _sway(rng), Sway([0.003, 0.003, 0.003, 0.01], rng)
@@ -91,6 +105,7 @@ def _handover(person: Someone, rng: np.random.Generator) -> Plan:
     return Plan(
         HANDOVER,
         person,
+        0.9 + 0.1 * person.back,
         t[10],
         thing,
         palms=lambda time: np.stack([right(time), left(time)]) + sway(time)[:6].reshape(2, 3),
@@ -98,6 +113,7 @@ def _handover(person: Someone, rng: np.random.Generator) -> Plan:
         feet=lambda time: feet,
         grip=grip,
         holds=(t[8], np.inf),
+        waits=t[8] - 0.02,
         tool=lambda time: tool(time) + wobble(time),
         closed=closed,
     )
@@ -152,6 +168,7 @@ def _lift(person: Someone, rng: np.random.Generator) -> Plan:
     return Plan(
         LIFT,
         person,
+        person.back,
         t[9],
         thing,
         palms=palms,
@@ -159,6 +176,7 @@ def _lift(person: Someone, rng: np.random.Generator) -> Plan:
         feet=feet,
         grip=grip,
         holds=(t[4] - 0.1, t[8]),
+        waits=t[4] - 0.12,
         tool=tool,
         closed=Track([t[3], t[4] - 0.1, t[7] + 0.1, t[8]], [[0.0], [1.0], [1.0], [0.0]]),
     )

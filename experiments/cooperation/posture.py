@@ -24,7 +24,7 @@ def posture(
     length = {name: share * height for name, share in SHARES.items()}
     reach = length["upper_arm"] + length["forearm"] + length["hand"]
     lean = ease + (LEAN - ease) * EFFORTS * min(1.0, 0.6 + back)
-    drop = SQUAT * EFFORTS * min(1.0, 1.3 - back)
+    drop = SQUAT * EFFORTS * min(1.0, 1.6 * (1.0 - back))
     hips = np.zeros((len(EFFORTS), 3))
     hips[:, 0] = pelvis[0] - 0.16 * np.sin(lean)  # so that it does not fall over
     hips[:, 1] = pelvis[1]
@@ -35,7 +35,7 @@ def posture(
     shoulders = np.stack([neck - across, neck + across])  # (2, E, 3)
     over = (np.linalg.norm(palms[:, None] - shoulders, axis=2) - SLACK * reach).max(axis=0)
     effort = _first_below(over)
-    lean, hips, up, neck = (np.interp(effort, EFFORTS, lean), *(_at(effort, way) for way in (hips, up, neck)))
+    lean, hips = float(np.interp(effort, EFFORTS, lean)), _at(effort, hips)
     up = np.array([np.sin(lean), 0.0, np.cos(lean)])
     neck = hips + length["trunk"] * up
     nod = np.array([np.sin(lean + 0.1), 0.0, np.cos(lean + 0.1)])

@@ -189,13 +189,15 @@ def hidden(model: Any, data: Any, joints: Mapping[str, np.ndarray], place: Place
     ways = np.array([joints[name] for name in TRACKED]) - eye
     lengths = np.linalg.norm(ways, axis=1)
     found, hit = np.empty(len(ways)), np.empty(len(ways), dtype=np.int32)
-    mujoco.mj_multiRay(model, data, eye, (ways / lengths[:, None]).ravel(), groups, 1, -1, hit, found, None, len(ways), 10.0)
+    mujoco.mj_multiRay(
+        model, data, eye, (ways / lengths[:, None]).ravel(), groups, 1, -1, hit, found, None, len(ways), 10.0
+    )
     return np.asarray((found >= 0) & (found < lengths - 0.06))  # the thing that a hand holds does not hide all of it
 
 
 def _forearm(along: np.ndarray) -> np.ndarray:
     """(3, 3) axes of a forearm: x forward or up, z from elbow to wrist."""
     z = along / max(float(np.linalg.norm(along)), 1e-9)
-    x = np.cross([0.0, 1.0, 0.0], z)
-    x /= max(float(np.linalg.norm(x)), 1e-9)
-    return np.column_stack([x, np.cross(z, x), z])
+    x = np.array([z[2], 0.0, -z[0]]) / max(float(np.hypot(z[0], z[2])), 1e-9)
+    y = np.array([z[1] * x[2], z[2] * x[0] - z[0] * x[2], -z[1] * x[0]])
+    return np.column_stack([x, y, z])

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from experiments.cooperation.guide import led
 from experiments.cooperation.people import SHIRTS
 from experiments.cooperation.plan import Plan
 from experiments.cooperation.posture import SIDES, posture
 from experiments.cooperation.sensors import SYNC, TICK, Moment, Sensors, hidden
-from experiments.cooperation.world import HANDOVER, STEP, World
+from experiments.cooperation.world import HANDLE, HANDOVER, STEP, World
 
 STEPS = round(TICK / STEP)
 STIFF, DAMP, STRONG = 900.0, 45.0, 90.0  # of an arm that holds: [N/m], [Ns/m], [N] at most
@@ -23,13 +23,17 @@ Robot = Callable[[int, np.ndarray | None], tuple[np.ndarray, float]]
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """What was read at 30 Hz. values: (T, 74), the encoders last. hid: (T,) share of joints hidden. done: a success."""
+    """What was read at 30 Hz. values: (T, 74), the encoders last. hid: (T,) share of joints hidden. done: a success.
+
+    waited: how long the person had to wait for the robot [s].
+    """
 
     times: np.ndarray
     values: np.ndarray
     hid: np.ndarray
     done: bool
     says: dict[str, float]
+    waited: float
     frames: list[np.ndarray]
 
 
@@ -67,9 +71,11 @@ class Hand:
         return np.asarray(world.data.xpos[world.thing] + world.data.xmat[world.thing].reshape(3, 3) @ self.at)
 
 
-def act(plan: Plan, robot: Robot, rng: np.random.Generator, film: tuple[str, int] | None = None, after: float = 0.0) -> Trial:
+def act(
+    plan: Plan, robot: Robot, rng: np.random.Generator, film: tuple[str, int] | None = None, patience: float = 0.0
+) -> Trial:
     """Play a trial. robot: what the servos are to reach, asked at every tick with its number, and a row where one is
-    there. film: a camera, and how many ticks between two pictures. after: how long it goes on [s] beyond its end."""
+    there. film: a camera, and how many ticks between two pictures. patience: how long the person waits at most [s]."""
     import mujoco
 
     from experiments.study.film import camera
@@ -89,13 +95,18 @@ def act(plan: Plan, robot: Robot, rng: np.random.Generator, film: tuple[str, int
     show = camera(model, film[0]) if film else None
     look = show.__enter__() if show else None
     try:
-        for tick in range(round((plan.duration + after) / TICK)):
-            time = tick * TICK
+        tick, waited, nearest = -1, 0, np.inf
+        while (time := (tick + 1 - waited) * TICK) < plan.duration:
+            tick += 1
             palms, soon = plan.palms(time), plan.palms(time + TICK)
+            nearest = min(nearest, _off(plan, world, palms)) if time >= plan.waits - 1.0 else nearest
+            if time >= plan.waits > time - TICK and waited * TICK < patience and not _ready(plan, world, palms, closed):
+                waited += 1
+                soon = palms
             _hold(plan, world, hands, palms, time)
             held = np.stack([p if h.at is None else h.point(world) for p, h in zip(palms, hands, strict=True)])
             feet = plan.feet(time)
-            skeleton = posture(plan.person.height, plan.person.back, plan.pelvis(time), feet, held, ease=0.06)
+            skeleton = posture(plan.person.height, plan.back, plan.pelvis(time), feet, held, ease=0.06)
             load = np.zeros((2, 3))
             for _ in range(STEPS):
                 data.qfrc_applied[:] = 0
@@ -118,7 +129,23 @@ def act(plan: Plan, robot: Robot, rng: np.random.Generator, film: tuple[str, int
             show.__exit__(None, None, None)
     times = np.arange(len(rows)) * SYNC * TICK
     done, says = _judged(plan, world, hands)
-    return Trial(times, np.array(rows), np.array(hid), done, says, frames)
+    says |= {"nearest": nearest}
+    return Trial(times, np.array(rows), np.array(hid), done, says, waited * TICK, frames)
+
+
+def _off(plan: Plan, world: World, palms: np.ndarray) -> float:
+    """How far the robot is from what the person waits for [m]: with the thing from their hand, or from the handle."""
+    at = world.data.xpos[world.thing]
+    if plan.place is HANDOVER:
+        return float(np.linalg.norm(at - palms[0]))
+    turn = world.data.xmat[world.thing].reshape(3, 3)
+    handle = at + turn @ [plan.place.thing[0] + 0.6 * HANDLE, 0.0, 0.0]
+    return float(np.linalg.norm(world.data.site_xpos[world.pinch] - handle))
+
+
+def _ready(plan: Plan, world: World, palms: np.ndarray, closed: float) -> bool:
+    """Whether the person sees that they can go on: the thing within their grasp, or the robot's fingers closed."""
+    return _off(plan, world, palms) < WITHIN if plan.place is HANDOVER else closed > 0.8
 
 
 def _hold(plan: Plan, world: World, hands: tuple[Hand, Hand], palms: np.ndarray, time: float) -> None:
@@ -149,14 +176,16 @@ def _judged(plan: Plan, world: World, hands: tuple[Hand, Hand]) -> tuple[bool, d
     return bool(on and tilt < 0.05), {"off": float(abs(at[2] - top - plan.place.thing[2])), "tilt": tilt}
 
 
-def demonstrated(plan: Plan, rng: np.random.Generator, film: tuple[str, int] | None = None) -> Trial:
-    """The robot is led along its way."""
-    from experiments.cooperation.guide import led
+def leading(plan: Plan, way: np.ndarray) -> Robot:
+    """A robot whose joints go this way (T, 6), at every tick."""
 
-    way = led(plan)
-
-    def robot(tick: int, row: Any) -> tuple[np.ndarray, float]:
+    def robot(tick: int, row: np.ndarray | None) -> tuple[np.ndarray, float]:
         at = min(max(tick, 0), len(way) - 1)
         return way[at], float(plan.closed(at * TICK)[0])
 
-    return act(plan, robot, rng, film)
+    return robot
+
+
+def demonstrated(plan: Plan, rng: np.random.Generator, film: tuple[str, int] | None = None) -> Trial:
+    """The robot is led along its way."""
+    return act(plan, leading(plan, led(plan)), rng, film)

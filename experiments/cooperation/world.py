@@ -158,5 +158,10 @@ def _thing(spec: Any, place: Place) -> None:
     body.add_geom(type=box, size=place.thing, mass=place.mass - 0.2, rgba=CARD, **rough)
     body.add_geom(type=box, size=[x + 1e-3, 0.03, z + 1e-3], rgba=TAPE, mass=0, contype=0, conaffinity=0, group=HIDES)
     body.add_geom(
-        type=box, size=[HANDLE / 2, 0.02, 0.06], pos=[x + HANDLE / 2, 0, 0], mass=0.2, rgba=(0.25, 0.26, 0.28, 1), **rough
+        type=box,
+        size=[HANDLE / 2, 0.02, 0.06],
+        pos=[x + HANDLE / 2, 0, 0],
+        mass=0.2,
+        rgba=(0.25, 0.26, 0.28, 1),
+        **rough,
     )
