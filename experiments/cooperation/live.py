@@ -38,10 +38,16 @@ class Answering:
 
 
 def answer(
-    settings: Settings, models: Stored, place: str, method: str, trials: Sequence[int], film: bool = False
+    settings: Settings,
+    models: Stored,
+    labels: Mapping[str, str],
+    place: str,
+    method: str,
+    trials: Sequence[int],
+    film: bool = False,
 ) -> Mapping[str, np.ndarray]:
     """{done, waited, error, phases}: how trials end; with film, pictures of the first at 13 a second."""
-    known = learned(models, f"{place}/live") if method != LED else {}
+    known = learned(models, labels) if method != LED else {}
     done, waited, off = [], [], []
     found: dict[str, np.ndarray] = {}
     for trial in trials:

@@ -9,7 +9,7 @@ import numpy as np
 
 import inphase
 from experiments.cooperation.demonstrations import distorted, recorded, without
-from experiments.cooperation.methods import METHODS, OURS, WRITTEN, followed
+from experiments.cooperation.methods import METHODS, WRITTEN, followed
 from experiments.cooperation.sensors import OBSERVED
 from experiments.study import Settings, Stored
 from experiments.study.as_written import as_written
@@ -22,37 +22,35 @@ WORN: dict[str, tuple[str, ...]] = {  # what is left at home
     "skeleton": ("imu", "emg", "shoes"),
     "wearables": ("skeleton",),
 }
-BOTH = (WRITTEN, OURS)
 
 
 def learn(
-    settings: Settings, stored: Stored, place: str, worn: str, fold: int | None, kinds: Sequence[str] = BOTH
+    settings: Settings, stored: Stored, place: str, worn: str, kind: str, out: Sequence[int]
 ) -> Mapping[str, np.ndarray]:
-    """Models of all demonstrations of a place but one; of all of them where none is named."""
+    """The dissertation's model, or ours, of all demonstrations of a place but those that are left out."""
     demonstrations = without(recorded(stored, place), WORN[worn])
-    if fold is not None:
-        demonstrations = demonstrations.without(fold)
-    found = {}
-    if WRITTEN in kinds:
-        found[WRITTEN] = packed(as_written(demonstrations, BASIS))
-    if OURS in kinds:
-        found[OURS] = packed(inphase.fit(demonstrations, calibrate=not settings.quick))
-    return found
+    demonstrations = demonstrations.subset([i for i in range(len(demonstrations)) if i not in out])
+    if kind == WRITTEN:
+        return {"model": packed(as_written(demonstrations, BASIS))}
+    return {"model": packed(inphase.fit(demonstrations, calibrate=not settings.quick))}
 
 
 def play(
     settings: Settings,
     stored: Stored,
     models: Stored,
+    labels: Mapping[str, str],
     place: str,
-    worn: str,
     fold: int,
     ratios: Sequence[float],
     methods: Sequence[str],
 ) -> Mapping[str, np.ndarray]:
-    """{method: (ratios, MARKS, 3)} errors for the demonstration that was left out, distorted in time."""
+    """{method: (ratios, MARKS, 3)} errors for a demonstration that was left out, distorted in time.
+
+    labels: of the models, by their kind.
+    """
     demonstration = recorded(stored, place)[fold]
-    known = learned(models, f"{place}/{worn}/{fold}")
+    known = learned(models, labels)
     found: dict[str, list[np.ndarray]] = {name: [] for name in methods}
     columns = np.array([OBSERVED.index(name) for name in next(iter(known.values())).observed])
     for ratio in ratios:
@@ -64,10 +62,10 @@ def play(
 
 
 def take_time(
-    settings: Settings, stored: Stored, models: Stored, place: str, ratios: Sequence[float]
+    settings: Settings, stored: Stored, models: Stored, labels: Mapping[str, str], place: str, ratios: Sequence[float]
 ) -> Mapping[str, np.ndarray]:
-    """{method: (ratios,)} how long it takes to take in a whole demonstration [s]; and how many samples these are."""
-    demonstration, known = recorded(stored, place)[0], learned(models, f"{place}/all/0")
+    """{method: (ratios,)} how long it takes to take in a whole demonstration [s of one processor]; and how many samples these are."""
+    demonstration, known = recorded(stored, place)[0], learned(models, labels)
     found = {name: np.full(len(ratios), np.inf) for name in METHODS}
     lengths = []
     for i, ratio in enumerate(ratios):
@@ -76,10 +74,10 @@ def take_time(
         for name, method in METHODS.items():
             for _ in range(1 if settings.quick else 2):
                 follower = method.make(known[method.model], 0)
-                began = time.perf_counter()
+                began = time.process_time()
                 for now, row in zip(times, demonstration.values[kept, : len(OBSERVED)], strict=True):
                     follower.observe(now, row)
-                found[name][i] = min(found[name][i], time.perf_counter() - began)
+                found[name][i] = min(found[name][i], time.process_time() - began)
     return found | {"samples": np.array(lengths)}
 
 
@@ -87,7 +85,6 @@ def _whole(demonstration: inphase.Demonstration) -> tuple[np.ndarray, np.ndarray
     return np.arange(len(demonstration)), demonstration.times
 
 
-def learned(models: Stored, label: str) -> dict[str, inphase.Model]:
-    """The models of a task that has learned."""
-    file = models[label]
-    return {name: unpacked(file[name]) for name in BOTH if name in file}
+def learned(models: Stored, labels: Mapping[str, str]) -> dict[str, inphase.Model]:
+    """Models by their kind, which are results by these labels."""
+    return {kind: unpacked(models[label]["model"]) for kind, label in labels.items()}

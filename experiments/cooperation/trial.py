@@ -10,7 +10,7 @@ import numpy as np
 from experiments.cooperation.guide import led
 from experiments.cooperation.people import SHIRTS
 from experiments.cooperation.plan import Plan
-from experiments.cooperation.posture import SIDES, posture
+from experiments.cooperation.posture import posture
 from experiments.cooperation.sensors import SYNC, TICK, Moment, Sensors, hidden
 from experiments.cooperation.world import HANDLE, HANDOVER, STEP, World
 
