@@ -29,7 +29,7 @@ def led(plan: Plan) -> np.ndarray:
 
     spec = mujoco.MjSpec()
     flange = add_arm(spec, prefix="arm_", pos=plan.place.base)
-    flange.parent.add_site(name="pinch", pos=flange.pos + [0.0, -PINCH, 0.0], quat=[0.5**0.5, 0.5**0.5, 0, 0])
+    flange.parent.add_site(name="pinch", pos=np.add(flange.pos, [0.0, -PINCH, 0.0]), quat=[0.5**0.5, 0.5**0.5, 0, 0])
     model = spec.compile()
     configuration = mink.Configuration(model)
     configuration.update(np.array(READY))

@@ -61,7 +61,7 @@ def turned(by: np.ndarray) -> np.ndarray:
 
 
 class Track:
-    """A smooth way through points (K, D) at times (K,) [s]: from each to the next with the least jerk (Flash, Hogan)."""
+    """A smooth way through points (K, D) at times (K,) [s]: from one to the next with the least jerk (Flash, Hogan)."""
 
     def __init__(self, times: np.ndarray | list[float], points: np.ndarray | list[object]) -> None:
         self.times, self.points = np.asarray(times, dtype=np.float64), np.asarray(points, dtype=np.float64)

@@ -79,10 +79,11 @@ def _handover(person: Someone, rng: np.random.Generator) -> Plan:
     )
     lead = rng.normal(0, 0.004, 3)  # who leads it does not hit the middle
     begin = np.array([1.02, -0.13, 1.10]) + rng.normal(0, 0.005, 3)
-    at, lifted = thing + [0, 0, 0.01] + lead, thing + [-0.05, 0.0, 0.16] + rng.normal(0, 0.015, 3)
-    before = at + 0.07 * _out(at, HANDOVER) + [0, 0, 0.12] + rng.normal(0, 0.01, 3)
-    given = take + [0.075, 0.0, 0.02] + rng.normal(0, 0.008, 3)
-    back = given + 0.16 * _out(given, HANDOVER) + [0, 0, 0.03]
+    at = thing + np.array([0, 0, 0.01]) + lead
+    lifted = thing + np.array([-0.05, 0.0, 0.16]) + rng.normal(0, 0.015, 3)
+    before = at + 0.07 * _out(at, HANDOVER) + np.array([0, 0, 0.12]) + rng.normal(0, 0.01, 3)
+    given = take + np.array([0.075, 0.0, 0.02]) + rng.normal(0, 0.008, 3)
+    back = given + 0.16 * _out(given, HANDOVER) + np.array([0, 0, 0.03])
     tool = Track(
         [t[2], t[3], t[4], t[5], t[6], t[7], t[9], t[10]],
         [
@@ -122,8 +123,8 @@ def _handover(person: Someone, rng: np.random.Generator) -> Plan:
 def _lift(person: Someone, rng: np.random.Generator) -> Plan:
     h, (half, wide, high) = person.height, LIFT.thing
     low, top = LIFT.tops
-    thing = np.array([low[0] + rng.uniform(-0.03, 0.03), low[1] + rng.uniform(-0.10, 0.10), low[4] + high])
-    goal = np.array([top[0] + rng.uniform(-0.03, 0.04), top[1] + rng.uniform(-0.10, 0.10), top[4] + high])
+    thing = np.array([low[0] + rng.uniform(-0.04, 0.04), low[1] + rng.uniform(-0.16, 0.16), low[4] + high])
+    goal = np.array([top[0] + rng.uniform(-0.03, 0.04), top[1] + rng.uniform(-0.15, 0.15), top[4] + high])
     carried = goal[2] + rng.uniform(0.06, 0.16)
     # idle, robot begins, both there, closed, up, across, down, let go, away
     t = _clock(person, rng)(rng.uniform(0.2, 0.9), 0.5, 1.9, 0.6, 1.4, 1.9, 1.0, 0.5, 1.1)
@@ -147,7 +148,7 @@ def _lift(person: Someone, rng: np.random.Generator) -> Plan:
 
     def palms(time: float) -> np.ndarray:
         share = from_rest(time)[0]
-        hanging = rest + [*stand(time), 0.0]
+        hanging = rest + np.array([*stand(time), 0.0])
         wider = np.array([[0.0, -0.12, 0.06], [0.0, 0.12, 0.06]]) * 4 * share * (1 - share)
         return np.asarray(share * (box(time) + held) + (1 - share) * hanging + wider) + sway(time)[:6].reshape(2, 3)
 

@@ -46,7 +46,7 @@ def posture(
         lower = length["forearm"] + length["hand"]
         elbow = bent(shoulder, palms[i], length["upper_arm"], lower, np.array([-0.35, 0.5 * sign, -0.8]))
         forward = (palms[i] - elbow) / max(float(np.linalg.norm(palms[i] - elbow)), 1e-9)
-        hip = hips + [0.0, sign * length["hips"] / 2, 0.0]
+        hip = hips + np.array([0.0, sign * length["hips"] / 2, 0.0])
         ankle = feet[i] + [0.0, 0.0, length["ankle"]]
         knee = bent(hip, ankle, length["thigh"], length["shank"], np.array([1.0, 0.1 * sign, 0.0]))
         joints |= {f"{side}_shoulder": shoulder, f"{side}_elbow": elbow}

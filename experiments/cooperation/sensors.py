@@ -1,4 +1,4 @@
-"""Six modalities, 74 channels: what the sensors make of a moment, each at its own rate, with its own noise and delay."""
+"""Six modalities, 74 channels: what sensors make of a moment, each at its own rate, with its own noise and delay."""
 
 from __future__ import annotations
 

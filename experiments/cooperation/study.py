@@ -13,6 +13,7 @@ from experiments.cooperation.methods import MARKS, METHODS, OURS, WRITTEN
 from experiments.study import Cell, Found, Page, Part, Settings, Study, Table, Task, task
 
 RATIOS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0)
+TIMED = (0.25, 0.5, 1.0, 2.0, 4.0)
 SHARES = tuple(range(1, MARKS, 2))  # of the marks: 0.1, 0.2 … of an interaction
 COMPARED = ("mean", "BIP", "eBIP, calibrated", "rbpf")  # for what is worn
 LIVE = ("led", "mean", "BIP", "eBIP, calibrated", "rbpf")
@@ -113,7 +114,7 @@ def _worn(settings: Settings) -> Mapping[str, Task]:
 
 def _time(settings: Settings) -> Mapping[str, Task]:
     stored, models = settings.of("demonstrations"), settings.of("models")
-    ratios = (0.5, 1.0) if settings.quick else (0.25, 0.5, 1.0, 2.0, 4.0)
+    ratios = TIMED[:2] if settings.quick else TIMED
     return {
         place: task(tasks.take_time, settings, stored, models, _labels(settings, place, "all", 0), place, ratios)
         for place in PLACES

@@ -64,7 +64,7 @@ def play(
 def take_time(
     settings: Settings, stored: Stored, models: Stored, labels: Mapping[str, str], place: str, ratios: Sequence[float]
 ) -> Mapping[str, np.ndarray]:
-    """{method: (ratios,)} how long it takes to take in a whole demonstration [s of one processor]; and how many samples these are."""
+    """{method: (ratios,)} what it takes to take in a whole demonstration [s of one processor]; {samples: how many}."""
     demonstration, known = recorded(stored, place)[0], learned(models, labels)
     found = {name: np.full(len(ratios), np.inf) for name in METHODS}
     lengths = []

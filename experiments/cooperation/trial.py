@@ -1,4 +1,4 @@
-"""One trial in the world: the person acts, the robot is led or answers, and what the sensors and encoders read is kept."""
+"""One trial in the world: the person acts, the robot is led or answers, and what sensors and encoders read is kept."""
 
 from __future__ import annotations
 

@@ -148,7 +148,7 @@ def _thing(spec: Any, place: Place) -> None:
     body = spec.worldbody.add_body(name="thing")
     body.add_freejoint(name="thing")
     rough = {"friction": [0.8, 0.01, 0.0005], "condim": 4, "group": HIDES}
-    x, y, z = place.thing
+    x, _, z = place.thing
     if place is HANDOVER:
         can = mujoco.mjtGeom.mjGEOM_CYLINDER
         band = {"mass": 0, "contype": 0, "conaffinity": 0, "group": HIDES}
