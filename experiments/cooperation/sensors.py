@@ -162,12 +162,12 @@ class Sensors:
         return np.asarray(read.ravel())
 
     def _shoes(self, moment: Moment) -> np.ndarray:
-        carried = -moment.load.sum(axis=0)
+        carried = -float(moment.load[:, 2].sum())
         middle = self._middles[-1]
-        down = self.person.weight * (GRAVITY + self._push[2]) + carried[2] * -1
+        down = self.person.weight * (GRAVITY + self._push[2]) + carried
         hands = np.mean([moment.joints[f"{s}_wrist"] for s in SIDES], axis=0)
         at = middle[:2] - middle[2] / GRAVITY * self._push[:2]
-        at = at + (hands[:2] - at) * np.clip(-carried[2] * -1 / max(down, 1.0), -0.3, 0.3)
+        at = at + (hands[:2] - at) * np.clip(carried / max(down, 1.0), -0.3, 0.3)
         ankles = np.array([moment.joints[f"{s}_ankle"] for s in SIDES])
         left = np.clip((at[1] - ankles[0, 1]) / max(ankles[1, 1] - ankles[0, 1], 0.05), 0.0, 1.0)
         shares = np.array([1 - left, left]) * np.clip(1 - moment.lifted / 0.01, 0.0, 1.0)

@@ -12,7 +12,7 @@ from experiments.cooperation.figures import TITLES, draw_costs, draw_errors, str
 from experiments.cooperation.methods import MARKS, METHODS, OURS, WRITTEN
 from experiments.study import Cell, Found, Page, Part, Settings, Study, Table, Task, task
 
-RATIOS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0)
+RATIOS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 4.0)
 TIMED = (0.25, 0.5, 1.0, 2.0, 4.0)
 SHARES = tuple(range(1, MARKS, 2))  # of the marks: 0.1, 0.2 … of an interaction
 COMPARED = ("mean", "BIP", "eBIP, calibrated", "rbpf")  # for what is worn
@@ -63,7 +63,7 @@ def _models(settings: Settings) -> Mapping[str, Task]:
     stored = settings.of("demonstrations")
     found: dict[str, Task] = {}
     for place in PLACES:
-        for worn in _wearing(settings, place):
+        for worn in _wearing(place):
             for fold in (*_folds(settings), *([None] if worn == "all" else [])):
                 for kind, label in _labels(settings, place, worn, fold).items():
                     if fold is None:
@@ -77,8 +77,8 @@ def _models(settings: Settings) -> Mapping[str, Task]:
     return {label: found[label] for label in ours_first}
 
 
-def _wearing(settings: Settings, place: str) -> tuple[str, ...]:
-    return ("all",) if settings.quick and place != "lift" else tuple(tasks.WORN)
+def _wearing(place: str) -> tuple[str, ...]:
+    return tuple(tasks.WORN) if place == "lift" else ("all",)
 
 
 def _played(
@@ -99,7 +99,7 @@ def _played(
         )
         for place in PLACES
         for what in worn
-        if what in _wearing(settings, place)
+        if what in _wearing(place)
         for fold in _folds(settings)
     }
 
