@@ -124,7 +124,7 @@ def _time(settings: Settings) -> Mapping[str, Task]:
 def _live(settings: Settings) -> Mapping[str, Task]:
     models, count = settings.of("models"), _trials(settings)
     at_once = min(10, count)
-    methods = ("led", "rbpf") if settings.quick else LIVE
+    methods = ("rbpf",) if settings.quick else LIVE
     return {
         f"{place}/{method}/{first}": task(
             live.answer,
@@ -165,7 +165,13 @@ def _tell_demonstrations(settings: Settings, found: Found, page: Page) -> None:
 
 
 def _tell_models(settings: Settings, found: Found, page: Page) -> None:
-    page.say(f"{len(found)} times one demonstration was left out: the dissertation's model, and ours.")
+    if settings.quick:
+        page.say("A taste: four demonstrations, and ours is not calibrated, so that nothing below is to be believed.")
+        return
+    page.say(
+        f"{len(found)} of them: the dissertation's without each demonstration, and ours without each five, as it is "
+        "calibrated, which takes minutes: it knows 20 demonstrations where the dissertation's knows 24."
+    )
 
 
 def _tell_temporal(settings: Settings, found: Found, page: Page) -> None:

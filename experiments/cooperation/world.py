@@ -31,7 +31,8 @@ class Place:
     base: tuple[float, float, float]
     eye: tuple[float, float, float]
     look: tuple[float, float, float]
-    film: tuple[float, float, float]
+    film: tuple[float, float, float]  # where it is filmed from …
+    stage: tuple[float, float, float]  # … and what
 
 
 HANDOVER = Place(
@@ -43,6 +44,7 @@ HANDOVER = Place(
     eye=(2.1, -0.9, 1.75),
     look=(0.0, 0.0, 1.1),
     film=(0.55, -2.75, 1.75),
+    stage=(0.72, 0.0, 0.92),
 )
 LIFT = Place(
     "lift",
@@ -52,7 +54,8 @@ LIFT = Place(
     base=(1.55, 0.35, 0.50),
     eye=(2.9, 0.35, 1.25),
     look=(0.0, 0.35, 0.9),
-    film=(-0.75, -2.75, 1.95),
+    film=(-0.95, -2.75, 1.95),
+    stage=(0.72, 0.32, 0.72),
 )
 HANDLE = 0.05  # [m] that the box's handle stands out on the robot's side
 
@@ -78,7 +81,7 @@ class World:
                 geom.group = HIDES
         self.person = Person(spec, height=height, shirt=shirt)
         _thing(spec, place)
-        add_camera(spec, "film", place.film, place.look if place is LIFT else (0.6, 0.0, 0.95), fovy=45)
+        add_camera(spec, "film", place.film, place.stage, fovy=36)
         add_camera(spec, "kinect", place.eye, place.look, fovy=50)
         self.place, self.model = place, spec.compile()
         self.data = mujoco.MjData(self.model)
