@@ -82,6 +82,19 @@ def test_who_bends_with_the_knees_is_lower_and_more_upright():
     assert ahead[0] < ahead[1] - 0.05
 
 
+@pytest.mark.parametrize("place", [HANDOVER, LIFT], ids=lambda place: place.name)
+def test_nothing_about_a_body_jerks(place):
+    acted = plan(place, 0, 3)
+    times = np.arange(0.0, acted.duration, TICK)
+    moved = [
+        posture(acted.person.height, acted.back, acted.pelvis(t), acted.feet(t), acted.palms(t), ease=0.06)
+        for t in times
+    ]
+    for name in ("right_wrist", "left_elbow", "neck", "head", "left_knee"):
+        pushed = np.diff([joints[name] for joints in moved], 2, axis=0) / TICK**2
+        assert np.abs(pushed).max() < 20.0  # [m/s²]
+
+
 def test_a_track_stands_at_its_points_and_is_half_way_at_half_time():
     track = Track([0.0, 1.0, 3.0], [[0.0], [2.0], [-2.0]])
     assert [track(t)[0] for t in (-1.0, 0.0, 1.0, 2.0, 3.0, 9.0)] == pytest.approx([0, 0, 2, 0, -2, -2])

@@ -17,6 +17,7 @@ from experiments.cooperation.world import HANDLE, HANDOVER, STEP, World
 STEPS = round(TICK / STEP)
 STIFF, DAMP, STRONG = 900.0, 45.0, 90.0  # of an arm that holds: [N/m], [Ns/m], [N] at most
 TURN, TURN_DAMP = 0.6, 0.02  # [Nm/rad], [Nms/rad] of a hand around a thing
+LETS_GO = 0.15  # [s] within which a hand that lets go is where it was to be
 WITHIN = 0.16  # [m] from the palm to the middle of a thing that it can take
 Robot = Callable[[int, np.ndarray | None], tuple[np.ndarray, float]]
 
@@ -43,6 +44,7 @@ class Hand:
     def __init__(self) -> None:
         self.at: np.ndarray | None = None
         self.turn: np.ndarray | None = None  # (3, 3) of the thing when it was taken
+        self._off = np.zeros(3)
 
     def pull(self, world: World, palm: np.ndarray, speed: np.ndarray, alone: bool) -> np.ndarray:
         """(3,) the force on the thing [N], which is applied; alone, it also keeps the thing as it was turned."""
@@ -66,9 +68,15 @@ class Hand:
         mujoco.mj_applyFT(world.model, data, force, torque, point, body, data.qfrc_applied)
         return force
 
-    def point(self, world: World) -> np.ndarray:
-        """(3,) where it holds the thing."""
-        return np.asarray(world.data.xpos[world.thing] + world.data.xmat[world.thing].reshape(3, 3) @ self.at)
+    def place(self, world: World, palm: np.ndarray) -> np.ndarray:
+        """(3,) where it is, asked once a tick: at what it holds, or where it was to be, without a jump between."""
+        if self.at is None:
+            self._off = self._off * np.exp(-TICK / LETS_GO)
+        else:
+            turn = world.data.xmat[world.thing].reshape(3, 3)
+            goal = world.data.xpos[world.thing] + turn @ self.at - palm
+            self._off = self._off + (1 - np.exp(-TICK / 0.02)) * (goal - self._off)
+        return np.asarray(palm + self._off)
 
 
 def act(
@@ -104,7 +112,7 @@ def act(
                 waited += 1
                 soon = palms
             _hold(plan, world, hands, palms, time)
-            held = np.stack([p if h.at is None else h.point(world) for p, h in zip(palms, hands, strict=True)])
+            held = np.stack([hand.place(world, palm) for hand, palm in zip(hands, palms, strict=True)])
             feet = plan.feet(time)
             skeleton = posture(plan.person.height, plan.back, plan.pelvis(time), feet, held, ease=0.06)
             load = np.zeros((2, 3))
