@@ -18,6 +18,7 @@ COLOURS = {
     "BIP": "#d1603d",
     "eBIP": "#e9a23b",
     "particle": "#8e3b46",
+    "BIP, calibrated": "#e58fa9",
     "eBIP, calibrated": "#6d5aa8",
     "promp, calibrated": "#3f8f5f",
     "rbpf": "#0b6e99",

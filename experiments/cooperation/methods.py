@@ -84,6 +84,7 @@ METHODS = {
     "BIP": _filtered(WRITTEN, "bip"),
     "eBIP": _filtered(WRITTEN, "ebip"),
     "particle": _filtered(WRITTEN, "particle"),
+    "BIP, calibrated": _filtered(OURS, "bip"),
     "eBIP, calibrated": _filtered(OURS, "ebip"),
     "promp, calibrated": _filtered(OURS, "promp"),
     "rbpf": _filtered(OURS, "rbpf"),

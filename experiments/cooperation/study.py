@@ -266,7 +266,7 @@ def _tell_time(settings: Settings, found: Found, page: Page) -> None:
             f"Of the longest BIP takes {100 * abs(whole):.0f} % {'less' if whole > 0 else 'more'} than IP with time "
             "warping (the dissertation: 66 % less)."
         )
-    seconds = {place: {name: found[place][name] for name in METHODS} for place in PLACES}
+    seconds = {place: {name: found[place][name] for name in METHODS if name != "mean"} for place in PLACES}
     page.picture(draw_costs(samples, seconds), "time", "Time to take in a whole interaction, by its length")
 
 
