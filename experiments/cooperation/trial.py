@@ -17,6 +17,7 @@ from experiments.cooperation.world import HANDLE, HANDOVER, STEP, World
 STEPS = round(TICK / STEP)
 STIFF, DAMP, STRONG = 900.0, 45.0, 90.0  # of an arm that holds: [N/m], [Ns/m], [N] at most
 TURN, TURN_DAMP = 0.6, 0.02  # [Nm/rad], [Nms/rad] of a hand around a thing
+EAGER, AT_HAND = 0.5, 0.10  # [s], [m]: nobody lets a thing fall that is in their hand
 LETS_GO = 0.15  # [s] within which a hand that lets go is where it was to be
 WITHIN = 0.16  # [m] from the palm to the middle of a thing that it can take
 Robot = Callable[[int, np.ndarray | None], tuple[np.ndarray, float]]
@@ -111,7 +112,7 @@ def act(
             if time >= plan.waits > time - TICK and waited * TICK < patience and not _ready(plan, world, palms, closed):
                 waited += 1
                 soon = palms
-            _hold(plan, world, hands, palms, time)
+            _hold(plan, world, hands, palms, time, EAGER if patience else 0.0)
             held = np.stack([hand.place(world, palm) for hand, palm in zip(hands, palms, strict=True)])
             feet = plan.feet(time)
             skeleton = posture(plan.person.height, plan.back, plan.pelvis(time), feet, held, ease=0.06)
@@ -156,9 +157,11 @@ def _ready(plan: Plan, world: World, palms: np.ndarray, closed: float) -> bool:
     return _off(plan, world, palms) < WITHIN if plan.place is HANDOVER else closed > 0.8
 
 
-def _hold(plan: Plan, world: World, hands: tuple[Hand, Hand], palms: np.ndarray, time: float) -> None:
-    """Take hold of the thing, and let go, when it is time."""
+def _hold(plan: Plan, world: World, hands: tuple[Hand, Hand], palms: np.ndarray, time: float, eager: float) -> None:
+    """Take hold of the thing, and let go, when it is time; eager: so much sooner where it is in the hand already [s]."""
     begin, end = plan.holds
+    if plan.place is HANDOVER and _off(plan, world, palms) < AT_HAND:
+        begin -= eager
     if not begin <= time < end:
         for hand in hands:
             hand.at = None
