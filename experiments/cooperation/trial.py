@@ -158,7 +158,7 @@ def _ready(plan: Plan, world: World, palms: np.ndarray, closed: float) -> bool:
 
 
 def _hold(plan: Plan, world: World, hands: tuple[Hand, Hand], palms: np.ndarray, time: float, eager: float) -> None:
-    """Take hold of the thing, and let go, when it is time; eager: so much sooner where it is in the hand already [s]."""
+    """Take hold of the thing, and let go, when it is time; eager: so much sooner what is in the hand already [s]."""
     begin, end = plan.holds
     if plan.place is HANDOVER and _off(plan, world, palms) < AT_HAND:
         begin -= eager
