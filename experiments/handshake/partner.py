@@ -16,7 +16,7 @@ REST = np.array([0.98, 0.20, 0.88])  # [m] of somebody's hand who waits
 SEEING = 0.2  # [s] between what they see and what they do about it
 THINKING = 10  # steps from one correction to the next
 STEP = 0.01  # [s]
-MOVES = 0.015  # [m] by which the robot has to have moved for somebody to see that it does
+MOVES = 0.010  # [m] by which the robot has to have moved for somebody to see that it does
 LAST = 0.35  # [s] that a correction takes, at least
 NEAR, CLOSING, LETS_GO = 0.04, 0.15, 0.10  # [m] and [s] until a hand closes around the other, [m] when it slips
 SPEEDS = {"fast": 0.6, "normal": 1.0, "slow": 1.8}  # of the time a reach takes, give or take each person's own idea
@@ -47,7 +47,7 @@ class Style:
         """Of the person with that number."""
         rng = np.random.default_rng([seed, 1, person])
         return cls(
-            delay=float(0.45 * np.exp(0.25 * rng.standard_normal())),
+            delay=float(0.28 * np.exp(0.25 * rng.standard_normal())),
             reach=float(1.7 * np.exp(0.12 * rng.standard_normal())),
             ahead=float(np.clip(0.45 + 0.15 * rng.standard_normal(), 0.1, 0.8)) + SURE * familiar,
             tremor=float(0.0015 * np.exp(0.3 * rng.standard_normal())),
@@ -134,7 +134,7 @@ class Partner:
         position, velocity, acceleration = self._course
         left = max(self.arrives - time, LAST if self._goal is None else 0.0)
         if left < STEP:
-            self._course[:] = self._target, 0.0, 0.0
+            self._course = np.stack([self._target, np.zeros(3), np.zeros(3)])
             return
         jerk = (60 * (self._target - position) - 36 * velocity * left - 9 * acceleration * left**2) / left**3
         self._course = np.stack(
