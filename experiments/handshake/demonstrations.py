@@ -20,24 +20,24 @@ def familiar(person: int) -> bool:
     return person in TRAINERS
 
 
-def follow(person: int, trajectory: Trajectory, label: tuple[int, ...], seed: int) -> Told:
+def follow(person: int, trajectory: Trajectory, label: tuple[int, ...], seed: int) -> tuple[Partner, Told]:
     """Somebody shakes the hand of a robot that does not heed them."""
     rng = np.random.default_rng([seed, *label])
     partner = Partner(Style.of(person, seed, familiar(person)).once(rng), rng)
     encounter = Encounter(partner, rng)
     encounter.until(LASTS, trajectory.at)
-    return encounter.told
+    return partner, encounter.told
 
 
-def taught(person: int, which: int, seed: int) -> dict[str, np.ndarray]:
+def taught(person: int, which: int, repetitions: int, seed: int) -> dict[str, np.ndarray]:
     """All repetitions of one training trajectory with one trainer: times (R, T), read (R, T, 30), truth (R, T, 6)."""
-    told = [follow(person, training()[which], (2, person, which, again), seed) for again in range(REPETITIONS)]
+    told = [follow(person, training()[which], (2, person, which, again), seed)[1] for again in range(repetitions)]
     return {"times": np.stack([t.times for t in told]), "read": np.stack([t.read for t in told])} | {
         "truth": np.stack([t.truth for t in told])
     }
 
 
-def static(person: int, which: int, again: int, seed: int) -> Told:
+def static(person: int, which: int, again: int, seed: int) -> tuple[Partner, Told]:
     """A test against one of the four other trajectories."""
     return follow(person, testing()[which], (3, person, which, again), seed)
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
 import inphase
 from experiments.handshake.demonstrations import familiar
-from experiments.handshake.encounter import Encounter, Told
-from experiments.handshake.lead import Led, as_written, live
+from experiments.handshake.encounter import LASTS, Encounter, Told
+from experiments.handshake.lead import RESPONDS, Led, as_written, live
 from experiments.handshake.partner import Partner, Style
 from experiments.handshake.robot import Arm
 
@@ -49,11 +48,39 @@ def led(
     return encounter.told, found
 
 
-def kept(told: Told, found: Led | None = None, partner: Partner | None = None) -> Mapping[str, Any]:
-    """As numbers and arrays by name."""
-    result: dict[str, Any] = {"times": told.times, "read": told.read, "truth": told.truth, "asked": told.references}
-    if found is not None:
-        result |= {"beliefs": found.beliefs, "responded": found.asked, "responses": found.responses, "held": found.held}
-    if partner is not None:
-        result |= {"began": partner.began, "arrives": partner.arrives, "clasped": partner.clasped}
+def stacked(trials: list[tuple[Partner, Told, Led | None]]) -> dict[str, np.ndarray]:
+    """Trials as arrays by name, (K, ...): what was read and true, and what was believed on a grid of 3 Hz.
+
+    moments: (K, 3) [s] at the end of the regions of Fig. 15: the partner begins, has arrived, and all is over. beliefs:
+    (K, 31, 4) phase, its std, velocity [1/s], its std. at_moments: (K, 3, 4) the same. responses: (K, 30, S, 28) times
+    [s] and pressures [MPa] of what was planned, 3 times a second, NaN where nothing was.
+    """
+    told = [t for _, t, _ in trials]
+    result = {
+        "read": np.stack([t.read for t in told]).astype(np.float32),
+        "truth": np.stack([t.truth for t in told]).astype(np.float32),
+        "references": np.stack([t.references for t in told]).astype(np.float32),
+        "clasped": np.array([p.clasped for p, _, _ in trials]),
+        "moments": np.array([(p.began, p.arrives, LASTS) for p, _, _ in trials]),
+    }
+    led = [found for _, _, found in trials if found is not None]
+    if led:
+        grid = np.arange(round(LASTS * RESPONDS) + 1) / RESPONDS
+        moments = np.where(np.isfinite(result["moments"]), result["moments"], LASTS)
+        result |= {
+            "beliefs": np.stack([_at(found.beliefs, grid) for found in led]),
+            "at_moments": np.stack([_at(found.beliefs, m) for found, m in zip(led, moments, strict=True)]),
+            "responses": np.stack([_first(found.responses, len(grid) - 1) for found in led]).astype(np.float32),
+            "held": np.array([found.held for found in led]),
+        }
     return result
+
+
+def _at(beliefs: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """The last belief at each time."""
+    return np.asarray(beliefs[np.clip(np.searchsorted(beliefs[:, 0], times, side="right") - 1, 0, None), 1:])
+
+
+def _first(responses: np.ndarray, count: int) -> np.ndarray:
+    missing = np.full((max(count - len(responses), 0), *responses.shape[1:]), np.nan)
+    return np.concatenate([responses[:count], missing])
