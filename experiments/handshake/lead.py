@@ -110,15 +110,16 @@ class Simulated:
     """A clock whose time is the simulation's: to wait is to let it go on."""
 
     def __init__(self, encounter: Encounter) -> None:
-        self._encounter = encounter
+        self._encounter, self._now = encounter, 0.0
 
     def now(self) -> float:
         """The time [s]."""
-        return self._encounter.time
+        return self._now
 
     def wait_until(self, time: float) -> None:
         """Go on to that time [s], which lies within the encounter or a little after it."""
         self._encounter.until(time)
+        self._now = max(self._now, time, self._encounter.time)  # its steps do not end where somebody waits for
 
 
 class Skeleton:
