@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -23,12 +24,18 @@ class Encounter:
 
     `times` [s], `read` (30,) and `truth` (6,) grow with every sample of the sensors: what they read, the partner's hand
     first, and where the hands are, the robot's first. look: is called with the arm 15 times a second.
+    model: the world, where it is not the bare one.
     """
 
     def __init__(
-        self, partner: Partner, rng: np.random.Generator, look: Callable[[Arm], None] | None = None, drawn: bool = False
+        self,
+        partner: Partner,
+        rng: np.random.Generator,
+        look: Callable[[Arm], None] | None = None,
+        model: Any = None,
     ) -> None:
-        self.partner, self.arm = partner, _hanging(drawn)
+        self.partner, self.arm = partner, Arm(start(), model)
+        self.arm.settle()
         self.camera, self._rng, self._look = Camera(rng), rng, look
         self.times: list[float] = []
         self.read: list[np.ndarray] = []
@@ -93,9 +100,3 @@ class Told:
         """(T,) [m] between both hands."""
         return np.asarray(np.linalg.norm(self.truth[:, :3] - self.truth[:, 3:], axis=1))
 
-
-def _hanging(drawn: bool) -> Arm:
-    """The arm as it hangs before anything begins; it is the same every time."""
-    arm = Arm(start(), drawn)
-    arm.settle()
-    return arm

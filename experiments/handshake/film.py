@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from experiments.bodies.person import Person
 from experiments.handshake.anatomy import MUSCLES
+from experiments.handshake.look import dressed, place
 from experiments.handshake.robot import Arm
 from experiments.handshake.trial import leading, led
 from experiments.handshake.work import learned
-from experiments.handshake.world import world
+from experiments.handshake.world import written
 from experiments.study.film import camera
 from experiments.study.stored import Stored
 
@@ -29,25 +31,24 @@ def acted(name: str, models: Stored, seed: int) -> Mapping[str, Any]:
     model, ends = learned(models, "calibrated")
     person, speed = SHOWN[name]
     frames: list[np.ndarray] = []
-    with camera(world(True), "side") as look:
+    world, person = dressed(written(drawn=True))
+    with camera(world, "side") as look:
 
         def picture(arm: Arm) -> None:
             if arm.data.time < UNTIL:
-                pose(arm)
+                pose(arm, person)
                 frames.append(look(arm.data))
 
-        led(METHOD, model, leading(person, speed, 0, ends, seed), seed, picture)
+        led(METHOD, model, leading(person, speed, 0, ends, seed), seed, picture, world)
     return {"frames": np.array(frames)}
 
 
-def pose(arm: Arm) -> None:
+def pose(arm: Arm, person: Person) -> None:
     """Colour the muscles by their pressures, and let the person's arm follow their hand."""
-    from experiments.handshake.look import place
-
     share = np.clip(arm.air.pressure / 0.5, 0, 1)[:, None]
     for name, colour in zip(MUSCLES, RELAXED + share * (TENSE - RELAXED), strict=True):
         arm.model.tendon(f"{name}_line").rgba[:3] = colour
-    place(arm)
+    place(arm, person)
 
 
 def strip(films: Mapping[str, np.ndarray]) -> Figure:

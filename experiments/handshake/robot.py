@@ -14,12 +14,15 @@ REST = np.full(len(MUSCLES), 0.2)  # [MPa], before the start's own pressures are
 
 
 class Arm:
-    """World and muscles together, stepped by 2 ms. `reference` (27,) [MPa] is what the valves are told."""
+    """World and muscles together, stepped by 2 ms; `air.reference` (27,) [MPa] is what the valves are told.
 
-    def __init__(self, pressure: np.ndarray, drawn: bool = False) -> None:
+    model: another world than the bare one, with something to look at.
+    """
+
+    def __init__(self, pressure: np.ndarray, model: Any = None) -> None:
         import mujoco
 
-        self.model = world(drawn)
+        self.model = world() if model is None else model
         self.data = mujoco.MjData(self.model)
         self._step = mujoco.mj_step
         self.joints = np.array([self.model.joint(name).qposadr[0] for name in JOINTS])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -40,9 +41,10 @@ def led(
     who: tuple[Partner, np.random.Generator],
     seed: int,
     look: Callable[[Arm], None] | None = None,
+    world: Any = None,
 ) -> tuple[Told, Led]:
-    """One encounter. method: "bip" as the dissertation writes it, or a filter of inphase in its live loop."""
-    encounter = Encounter(*who, look=look, drawn=look is not None)
+    """One encounter. method: "bip" as the dissertation writes it, or a filter of inphase in its live loop. look, world: of a film."""
+    encounter = Encounter(*who, look=look, model=world)
     session = model.session(filter=method, seed=seed)
     found = (as_written if method == "bip" else live)(encounter, session)
     return encounter.told, found

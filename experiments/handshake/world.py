@@ -22,43 +22,31 @@ JOINT_AT = {  # axis, damping [N m s/rad], armature [kg m²]
     "wrist_flexion": ("1 0 0", 0.08, 0.002),
     "wrist_deviation": ("0 -1 0", 0.08, 0.002),
 }
-LIGHT = """
-  <visual>
-    <headlight ambient="0.42 0.42 0.42" diffuse="0.35 0.35 0.35" specular="0 0 0"/>
-    <quality shadowsize="2048"/><global offwidth="960" offheight="640"/>
-    <map znear="0.02"/>
-  </visual>
+MATERIALS = """
+  <visual><global offwidth="960" offheight="640"/><map znear="0.02"/></visual>
   <asset>
-    <texture name="sky" type="skybox" builtin="gradient" rgb1="0.93 0.95 0.97" rgb2="0.72 0.78 0.84" width="64"
-             height="384"/>
-    <texture name="floor" type="2d" builtin="checker" rgb1="0.80 0.81 0.83" rgb2="0.74 0.75 0.77" width="256"
-             height="256"/>
-    <material name="floor" texture="floor" texrepeat="8 8" reflectance="0.05"/>
     <material name="bone" rgba="0.86 0.87 0.89 1" specular="0.4"/>
     <material name="frame" rgba="0.25 0.28 0.33 1"/>
     <material name="joint" rgba="0.35 0.39 0.45 1"/>
     <material name="skin" rgba="0.87 0.68 0.55 1"/>
-    <material name="shirt" rgba="0.24 0.45 0.62 1"/>
-    <material name="trousers" rgba="0.22 0.24 0.30 1"/>
-    <material name="hair" rgba="0.25 0.17 0.12 1"/>
   </asset>
 """
 
 
 @cache
-def world(drawn: bool = False) -> Any:
-    """The compiled model. drawn: with muscles and a partner to look at; neither changes how anything moves."""
+def world() -> Any:
+    """The compiled model."""
     import mujoco
 
-    return mujoco.MjModel.from_xml_string(written(drawn))
+    return mujoco.MjModel.from_xml_string(written())
 
 
-def written(drawn: bool) -> str:
-    """Its MJCF."""
+def written(drawn: bool = False) -> str:
+    """Its MJCF. drawn: with muscles to look at; they do not change how anything moves."""
     return f"""<mujoco model="handshake">
   <compiler angle="radian" autolimits="true"/>
   <option timestep="{STEP}" integrator="implicitfast"/>
-  {LIGHT}
+  {MATERIALS}
   <default>
     <geom contype="0" conaffinity="0"/>
     <default class="palm">
@@ -66,10 +54,6 @@ def written(drawn: bool) -> str:
     </default>
   </default>
   <worldbody>
-    <light pos="0.3 -2.5 3.2" dir="0 0.7 -0.7" diffuse="0.55 0.55 0.52" castshadow="true"/>
-    <light pos="0.6 2.5 3" dir="0 -0.6 -0.7" diffuse="0.2 0.2 0.22" castshadow="false"/>
-    <geom name="floor" type="plane" size="4 4 0.1" material="floor"/>
-    <camera name="side" pos="0.62 -2.15 1.52" xyaxes="1 0 0 0 0.14 0.99" fovy="42"/>
     {_robot(drawn)}
     <body name="partner_hand" pos="1.05 0.25 0.85">
       <freejoint name="partner_hand"/>
@@ -83,7 +67,6 @@ def written(drawn: bool) -> str:
       <site name="partner_grip" size="0.006" rgba="0 0 0 0"/>
     </body>
     <body name="partner_will" mocap="true" pos="1.05 0.25 0.85"/>
-    {_partner() if drawn else ""}
   </worldbody>
   <equality>
     <weld name="will" body1="partner_will" body2="partner_hand" solref="0.03 1" solimp="0.7 0.9 0.02"/>
@@ -185,27 +168,3 @@ def _lines() -> Iterable[str]:
             f'<site site="{name}_from"/><site site="{name}_to"/></spatial>'
         )
 
-
-def _partner() -> str:
-    """Somebody to look at, who stands; the arm is put where the hand is."""
-    return """
-    <body name="partner" pos="1.22 0.05 0">
-      <geom type="capsule" fromto="0 0.09 0.10 0.0 0.085 0.85" size="0.075" material="trousers"/>
-      <geom type="capsule" fromto="0 -0.09 0.10 0.0 -0.085 0.85" size="0.075" material="trousers"/>
-      <geom type="ellipsoid" pos="-0.05 0.10 0.04" size="0.13 0.05 0.045" material="hair"/>
-      <geom type="ellipsoid" pos="-0.05 -0.10 0.04" size="0.13 0.05 0.045" material="hair"/>
-      <geom type="ellipsoid" pos="0 0 1.15" size="0.115 0.185 0.31" material="shirt"/>
-      <geom type="capsule" fromto="0.0 0.17 1.38 0.0 -0.17 1.38" size="0.060" material="shirt"/>
-      <geom type="capsule" fromto="0 0 1.44 0 0 1.52" size="0.048" material="skin"/>
-      <geom type="ellipsoid" pos="-0.01 0 1.63" size="0.095 0.078 0.12" material="skin"/>
-      <geom type="ellipsoid" pos="0.015 0 1.665" size="0.095 0.083 0.105" material="hair"/>
-      <geom type="ellipsoid" pos="-0.105 0 1.62" size="0.018 0.012 0.02" material="skin"/>
-      <geom type="capsule" fromto="0 -0.22 1.37 0.02 -0.25 1.09" size="0.043" material="shirt"/>
-      <geom type="capsule" fromto="0.02 -0.25 1.09 -0.04 -0.25 0.85" size="0.034" material="skin"/>
-    </body>
-    <body name="partner_upper" mocap="true" pos="1.22 0.27 1.2">
-      <geom type="capsule" fromto="0 0 -0.14 0 0 0.14" size="0.045" material="shirt"/>
-    </body>
-    <body name="partner_lower" mocap="true" pos="1.22 0.27 0.95">
-      <geom type="capsule" fromto="0 0 -0.125 0 0 0.125" size="0.035" material="skin"/>
-    </body>"""
