@@ -47,7 +47,7 @@ def pose(arm: Arm, person: Person) -> None:
     """Colour the muscles by their pressures, and let the person's arm follow their hand."""
     share = np.clip(arm.air.pressure / 0.5, 0, 1)[:, None]
     for name, colour in zip(MUSCLES, RELAXED + share * (TENSE - RELAXED), strict=True):
-        arm.model.tendon(f"{name}_line").rgba[:3] = colour
+        arm.model.tendon_rgba[arm.model.tendon(f"{name}_line").id, :3] = colour
     place(arm, person)
 
 

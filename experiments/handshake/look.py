@@ -22,13 +22,15 @@ def dressed(written: str) -> tuple[Any, Person]:
 
     spec = mujoco.MjSpec.from_string(written)
     add_room(spec)
-    add_camera(spec, "side", (0.42, -2.45, 1.55), (0.50, 0.0, 1.03), 41.0)
-    person = Person(spec, height=HEIGHT)
+    add_camera(spec, "side", (0.42, -2.45, 1.50), (0.50, 0.0, 1.08), 36.0)
+    person = Person(spec, height=HEIGHT, shirt=(0.24, 0.45, 0.62, 1))
     return spec.compile(), person
 
 
 def place(arm: Arm, person: Person) -> None:
     """Put the person where they are now: they lean a little to reach."""
+    import mujoco
+
     joints = standing(HEIGHT, STANDS, np.pi)
     lean = np.clip(0.75 - arm.partner[0], 0.0, 0.5) * 0.25
     for name in ("head", "neck", "left_shoulder", "right_shoulder", "left_elbow", "left_wrist"):
@@ -40,3 +42,4 @@ def place(arm: Arm, person: Person) -> None:
         joints["right_shoulder"], wrist, lengths["upper_arm"], lengths["forearm"], (0.3, 0.2, -1.0)
     )
     person.place(arm.data, joints, look=(-1.0, 0.0, -0.15))
+    mujoco.mj_kinematics(arm.model, arm.data)

@@ -59,7 +59,8 @@ def start() -> np.ndarray:
 def _made(place: tuple[float, float, float], number: int) -> Trajectory:
     rng = np.random.default_rng([12, number])
     stiffer = rng.uniform(0.9, 1.25)  # nobody tunes two trajectories alike
-    return Trajectory(start(), holding(posture(place), start() * stiffer, free=~STILL))
+    near = start() * np.where(STILL, 1.0, stiffer)
+    return Trajectory(start(), holding(posture(place), near, free=~STILL))
 
 
 @cache
