@@ -52,8 +52,8 @@ def _leading(settings: Settings) -> Mapping[str, Task]:
     again, models = 1 if settings.quick else 2, settings.of("models")
     return {
         f"{method}/person{person}": task(against_method, method, person, again, models, settings.seed)
-        for method in MODELS
         for person in people(settings)
+        for method in MODELS
     }
 
 
