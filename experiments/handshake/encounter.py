@@ -99,4 +99,3 @@ class Told:
     def apart(self) -> np.ndarray:
         """(T,) [m] between both hands."""
         return np.asarray(np.linalg.norm(self.truth[:, :3] - self.truth[:, 3:], axis=1))
-

@@ -8,6 +8,7 @@ import numpy as np
 
 from experiments.handshake.anatomy import NAMES, STILL
 from experiments.handshake.measures import correlations, sliding
+from experiments.handshake.partner import SPEEDS
 from experiments.handshake.sensors import HAND, RATE
 from experiments.handshake.tell import LED, trials
 from experiments.handshake.tell import NAMES as METHODS
@@ -56,8 +57,8 @@ def phase(settings: Settings, found: Found, page: Page) -> None:
     page.say(
         "Fast against slow, when the partner has arrived (ratio of the medians): "
         + "; ".join(f"{m} phase {p:.2f}, velocity {v:.2f}" for m, (p, v) in ratios.items())
-        + ". The dissertation's finding, that the phase is the same and the velocity is not, would be 1 and the ratio of "
-        f"the tempi, {1.8 / 0.6:.0f}."
+        + ". The dissertation's finding, that the phase is the same and the velocity is not, would be 1 and the ratio "
+        f"of the tempi, {SPEEDS['slow'] / SPEEDS['fast']:.0f}."
     )
 
 
@@ -79,7 +80,7 @@ def _regions(settings: Settings, method: str) -> Figure:
         for r, (colour, _) in enumerate(REGIONS[: len(edges) - 1]):
             top.axvspan(edges[r], edges[r + 1], color=colour, alpha=0.18, lw=0)
             _density(middle, *beliefs[r if len(edges) > 2 else 2, :2], (-0.05, 1.05), colour)
-            _density(bottom, *beliefs[r if len(edges) > 2 else 2, 2:], (-0.1, 0.6), colour)
+            _density(bottom, *beliefs[r if len(edges) > 2 else 2, 2:], (-0.3, 0.6), colour)
         middle.set_xlabel("phase")
         bottom.set_xlabel("phase velocity [1/s]")
     axes[0, 0].set_ylabel("hand x [m]")
@@ -133,6 +134,7 @@ def prediction(settings: Settings, found: Found, page: Page) -> None:
             for age, plan in enumerate(made[-16:-1]):
                 ax.plot(plan[:, 0], plan[:, 1 + muscle], color=COLOURS[1], lw=0.7, ls="--", alpha=0.25 + 0.03 * age)
             ax.plot(made[-1][:, 0], made[-1][:, 1 + muscle], color=NOW, lw=1.6, ls="--", label="predicted now")
+            ax.plot(*made[-1][0, [0, 1 + muscle]], "o", color=NOW, ms=4)
             ax.plot(times[: len(read)], read[:, 3 + muscle], color=PAST, lw=1.6, label="pressure as it was")
             ax.set_title(f"{METHODS[method]}: {speed}{' to another place' if which else ''}", fontsize=9)
             ax.set_xlim(0, 10.5)
@@ -146,7 +148,9 @@ def prediction(settings: Settings, found: Found, page: Page) -> None:
     for ax in axes[-1]:
         ax.set_xlabel("time [s]")
     axes[0, 0].legend(frameon=False, fontsize=8, loc="upper right")
-    page.picture(figure, "prediction", "predicted pressure of the biceps, earlier predictions, and the pressure as it was")
+    page.picture(
+        figure, "prediction", "predicted pressure of the biceps, earlier predictions, and the pressure as it was"
+    )
     page.say("Blue: the prediction after 5.6 s; red: the 15 before it, a third of a second apart; orange: the hand, x.")
 
 
@@ -154,10 +158,11 @@ def profiles(settings: Settings, found: Found, page: Page) -> None:
     """Fig. 18: how the partner's hand moves."""
     static, leading = settings.of("static"), settings.of("leading")
     groups = {"static": np.concatenate([trials(static, i, len(TESTING), "truth")[0] for i in range(len(TESTING))])}
-    groups |= {m: np.concatenate([trials(leading, i, len(LED), "truth", m)[0] for i in range(3)]) for m in SHOWN}
+    # Who leads does the same whoever moves the robot.
+    groups["partner leads"] = np.concatenate([trials(leading, i, len(LED), "truth", "rbpf")[0] for i in range(3)])
     figure, axes = _figure(3, 2, (9, 6.5), sharex=True)
     times, peaks = np.arange(301) / RATE, {}
-    for colour, (name, truth) in zip((PAST, COLOURS[1], COLOURS[0]), groups.items(), strict=True):
+    for colour, (name, truth) in zip((COLOURS[1], NOW), groups.items(), strict=True):
         hand = truth[:, :, 3:].astype(float)
         smooth = np.apply_along_axis(lambda v: np.convolve(np.pad(v, 3, "edge"), np.ones(7) / 7, "valid"), 1, hand)
         speed = np.gradient(smooth, 1 / RATE, axis=1)
@@ -183,12 +188,15 @@ def correlation(settings: Settings, found: Found, page: Page) -> None:
     groups = {"static": np.concatenate([trials(static, i, len(TESTING), "read")[0] for i in range(len(TESTING))])}
     groups |= {m: np.concatenate([trials(leading, i, len(LED), "read", m)[0] for i in range(3)]) for m in SHOWN}
     figure, axes = _figure(1, len(groups), (11, 4))
-    table = Table("mean size of the correlation of hand and", ["muscles that were commanded", "muscles that never were"])
+    table = Table(
+        "mean size of the correlation of hand and", ["muscles that were commanded", "muscles that never were"]
+    )
     for ax, (name, read) in zip(axes[0], groups.items(), strict=True):
         mean = np.mean([correlations(r) for r in read], axis=0)
         shown = ax.imshow(np.abs(mean), vmin=0, vmax=1, cmap="viridis")
         ax.set_title(name, fontsize=10)
         ax.grid(False)
+        ax.set_xlabel("pressures 0 to 26, hand 27 to 29")
         of_hand = np.abs(mean[-len(HAND) :, : len(STILL)])
         table.add(name, {c: f"{of_hand[:, s].mean():.2f}" for c, s in zip(table.columns, (~STILL, STILL), strict=True)})
     figure.colorbar(shown, ax=axes[0].tolist(), shrink=0.8)

@@ -101,7 +101,16 @@ def live(encounter: Encounter, session: Session) -> Led:
         journal=notes,
         shared_clock=["camera"],
     )
-    loop.run(LASTS, watch=False)
+    # Not `run`: Ctrl-C is to end the study, not to bring a robot to rest.
+    loop.begin()
+    try:
+        while not loop.over and loop.due < LASTS:
+            clock.wait_until(loop.due)
+            loop.cycle()
+    finally:
+        loop.end()
+    if loop.actuation.guard.failure is not None:
+        raise loop.actuation.guard.failure
     encounter.until(LASTS)
     return notes.led
 

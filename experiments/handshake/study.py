@@ -14,11 +14,11 @@ from experiments.handshake.work import MODELS, against_method, against_static, l
 from experiments.study import Found, Page, Part, Settings, Study, Task, task
 
 SAYS = """
-An arm of 10 joints with 27 McKibben muscles (MuJoCo, one force law, valve and braid friction for each), of which a model
-sees nothing but pressures, and a person's hand by camera at 30 Hz. Training is by response elicitation (2.4): 12
-trajectories of pressures that were made beforehand, three partners who adapt. Tests are with those three and five more:
-four scenarios with other trajectories that do not heed anybody (static), and four in which the partner leads, fast,
-normal, slow, or not moving at all. **bip** is the dissertation's: 450 weights, noise of Eq. 2.15, inference and response
+An arm of 10 joints with 27 McKibben muscles in MuJoCo, each with its force law, valve and braid friction, of which a
+model sees nothing but pressures, and a person's hand by camera at 30 Hz. Training is by response elicitation (2.4): 12
+trajectories of pressures that were made beforehand, and three partners who adapt. Tests are with those three and five
+more: four scenarios with other trajectories that do not heed anybody (static), and four in which the partner leads,
+fast, normal, slow, or not moving at all. **bip** is the dissertation's: 450 weights, noise of Eq. 2.15, inference and response
 at 3 Hz, played at 10 Hz through an alpha-beta filter. **ebip** and **rbpf** are inphase with nothing set: `fit`, and the
 live loop at its own rates.
 """
@@ -76,7 +76,9 @@ def _taught(settings: Settings, found: Found, page: Page) -> None:
     ends = truth[:, -1, :3]
     page.say(
         f"{len(read)} demonstrations of {len(read[0])} samples. The robot's hand ended within "
-        + ", ".join(f"{name} {low:.2f} … {high:.2f} m" for name, low, high in zip("xyz", ends.min(0), ends.max(0)))
+        + ", ".join(
+            f"{name} {low:.2f} … {high:.2f} m" for name, low, high in zip("xyz", ends.min(0), ends.max(0), strict=True)
+        )
         + f"; the hands were {1000 * np.median(tell.ends_apart(truth)):.0f} mm apart at the end (median)."
     )
 

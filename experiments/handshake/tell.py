@@ -9,7 +9,7 @@ from experiments.handshake.measures import MET, at_end, met_at
 from experiments.handshake.measures import completion as time_to_completion
 from experiments.handshake.trajectories import TESTING
 from experiments.handshake.work import MODELS
-from experiments.study import Cell, Found, Page, Settings, Table
+from experiments.study import Found, Page, Settings, Table
 from experiments.study.stored import Stored
 from experiments.study.table import SIGNIFICANT, marked
 
@@ -82,7 +82,9 @@ def met(settings: Settings, found: Found, page: Page) -> None:
         f"{100 * np.median(followed):.1f} cm. Who leads waits at the place of their own choice and does not help."
     )
     held = {m: int(sum(leading[f"{m}/person{p}"]["held"].sum() for p in persons(leading))) for m in MODELS}
-    page.say("The live loop held the robot back " + ", ".join(f"{held[m]} times with {m}" for m in ("ebip", "rbpf")) + ".")
+    page.say(
+        "The live loop held the robot back " + ", ".join(f"{held[m]} times with {m}" for m in ("ebip", "rbpf")) + "."
+    )
 
 
 def completion(settings: Settings, found: Found, page: Page) -> None:
@@ -105,7 +107,7 @@ def completion(settings: Settings, found: Found, page: Page) -> None:
     table = Table("Time-to-Completion", columns)
     for name, cells in rows.items():
         theirs = THEIRS.get(name.split(", ")[-1].replace(" ", ""), ("", "", ""))
-        table.add(name, dict(zip(columns, cells)), dict(zip(columns, theirs)))
+        table.add(name, dict(zip(columns, cells, strict=True)), dict(zip(columns, theirs, strict=True)))
     page.table(table)
     page.say(
         "Shares of the 10 s, beside the dissertation's numbers. **Bold**: the smallest of a column among one method and "
@@ -120,9 +122,10 @@ def _compared(scored: dict[str, tuple[np.ndarray, np.ndarray]], page: Page) -> N
 
     said = []
     for group, chosen in (("trained it", familiar), ("had not", lambda p: not familiar(p))):
-        still = np.concatenate([s[[chosen(p) for p in who]] for n, (s, who) in scored.items() if n.startswith("static")])
+        values = {name: s[np.array([chosen(p) for p in who])] for name, (s, who) in scored.items()}
+        static = np.concatenate([v for name, v in values.items() if name.startswith("static")])
         for method in MODELS:
-            led = np.concatenate([scored[f"{method}, {s}"][0][[chosen(p) for p in scored[f"{method}, {s}"][1]]] for s in LED[:2]])
-            p = mannwhitneyu(led, still).pvalue
-            said.append(f"{method} {led.mean():.3f} against {still.mean():.3f} (p = {p:.2g}) for those who {group}")
+            led = np.concatenate([values[f"{method}, {speed}"] for speed in LED[:2]])
+            p = mannwhitneyu(led, static).pvalue
+            said.append(f"{method} {led.mean():.3f} against {static.mean():.3f} (p = {p:.2g}) for those who {group}")
     page.say("Fast and normal together against all static: " + "; ".join(said) + ".")

@@ -43,7 +43,10 @@ def led(
     look: Callable[[Arm], None] | None = None,
     world: Any = None,
 ) -> tuple[Told, Led]:
-    """One encounter. method: "bip" as the dissertation writes it, or a filter of inphase in its live loop. look, world: of a film."""
+    """One encounter. method: "bip" as the dissertation writes it, or a filter of inphase in its live loop.
+
+    look, world: of a film, as for `Encounter`.
+    """
     encounter = Encounter(*who, look=look, model=world)
     session = model.session(filter=method, seed=seed)
     found = (as_written if method == "bip" else live)(encounter, session)

@@ -33,10 +33,8 @@ def learn(which: str, lessons: Stored, quick: bool) -> Mapping[str, Any]:
     """A model as a file in an array, and where hands were shaken (N, 3) [m]. which: "written" or "calibrated"."""
     told = [lessons[label] for label in lessons]
     data = dataset(np.concatenate([t["times"] for t in told]), np.concatenate([t["read"] for t in told]))
-    if which == "written":
-        model = as_written(data, Gaussian(FUNCTIONS))
-    else:
-        model = inphase.fit(data, calibrate=not quick)
+    written = which == "written"
+    model = as_written(data, Gaussian(FUNCTIONS)) if written else inphase.fit(data, calibrate=not quick)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.inphase"
         model.save(path)

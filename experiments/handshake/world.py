@@ -167,4 +167,3 @@ def _lines() -> Iterable[str]:
             f'<spatial name="{name}_line" width="{muscle.diameter / 2500}" rgba="0.7 0.3 0.25 1">'
             f'<site site="{name}_from"/><site site="{name}_to"/></spatial>'
         )
-
