@@ -18,9 +18,9 @@ An arm of 10 joints with 27 McKibben muscles in MuJoCo, each with its force law,
 model sees nothing but pressures, and a person's hand by camera at 30 Hz. Training is by response elicitation (2.4): 12
 trajectories of pressures that were made beforehand, and three partners who adapt. Tests are with those three and five
 more: four scenarios with other trajectories that do not heed anybody (static), and four in which the partner leads,
-fast, normal, slow, or not moving at all. **bip** is the dissertation's: 450 weights, noise of Eq. 2.15, inference and response
-at 3 Hz, played at 10 Hz through an alpha-beta filter. **ebip** and **rbpf** are inphase with nothing set: `fit`, and the
-live loop at its own rates.
+fast, normal, slow, or not moving at all. **bip** is the dissertation's: 450 weights, noise of Eq. 2.15, inference and
+response at 3 Hz, played at 10 Hz through an alpha-beta filter. **ebip** and **rbpf** are inphase with nothing set:
+`fit`, and the live loop at its own rates.
 """
 
 

@@ -110,8 +110,8 @@ def completion(settings: Settings, found: Found, page: Page) -> None:
         table.add(name, dict(zip(columns, cells, strict=True)), dict(zip(columns, theirs, strict=True)))
     page.table(table)
     page.say(
-        "Shares of the 10 s, beside the dissertation's numbers. **Bold**: the smallest of a column among one method and "
-        f"the static scenarios (theirs as compared with bip); ≈: not significantly larger (U test, {SIGNIFICANT})."
+        "Shares of the 10 s, beside the dissertation's numbers. **Bold**: the smallest of a column among one method "
+        f"and the static scenarios (theirs as compared with bip); ≈: not significantly larger (U test, {SIGNIFICANT})."
     )
     _compared(scored, page)
 
