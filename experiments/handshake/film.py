@@ -31,12 +31,12 @@ def acted(name: str, models: Stored, seed: int) -> Mapping[str, Any]:
     model, ends = learned(models, "calibrated")
     person, speed = SHOWN[name]
     frames: list[np.ndarray] = []
-    world, person = dressed(written(drawn=True))
+    world, mannequin = dressed(written(drawn=True))
     with camera(world, "side") as look:
 
         def picture(arm: Arm) -> None:
             if arm.data.time < UNTIL:
-                pose(arm, person)
+                pose(arm, mannequin)
                 frames.append(look(arm.data))
 
         led(METHOD, model, leading(person, speed, 0, ends, seed), seed, picture, world)

@@ -24,11 +24,12 @@ def leading(
 ) -> tuple[Partner, np.random.Generator]:
     """Somebody who leads; the same whoever moves the robot. ends: (N, 3) [m] where hands were shaken in the training.
 
-    They want to shake hands where the robot can: anywhere around the middle of those places.
+    They want to shake hands where the robot can: anywhere around the middle of those places, and at the same place
+    whatever their speed.
     """
     rng = np.random.default_rng([seed, 4, person, SPEEDS.index(speed), again])
     style = Style.of(person, seed, familiar(person)).once(rng)
-    away = style.place + rng.standard_normal(3)
+    away = style.place + np.random.default_rng([seed, 5, person, again]).standard_normal(3)
     away *= min(1.0, WIDEST / np.linalg.norm(away))
     goal = ends.mean(0) + np.linalg.cholesky(np.cov(ends.T)) @ away
     tempo = style.tempi.get(speed, 1.0)
