@@ -15,7 +15,8 @@ from experiments.hugging.teleoperator import Teleoperator
 from experiments.hugging.world import JOINTS, world
 
 TRAINED, NOVEL = 4, 2
-HUGS = 121
+MADE, KEPT = 150, 121  # hugs that are taught, and of them with contact on all sides, as in 3.3.2.2
+CHEST, BACK = 60.0, 25.0  # [raw] of a hug that is one: median over the time the operator presses
 CONTROLLED = (*(f"joint_{name}" for name in JOINTS), *(f"force_{name}" for name in pads.ARMS))
 FORCES = {side: [CONTROLLED.index(f"force_{n}") for n in pads.ARMS if n.startswith(side)] for side in ("left", "right")}
 UNITS = {"pose_*": "px", "touch_*": "raw", "joint_*": "rad", "force_*": "raw"}
@@ -43,13 +44,27 @@ def some(numbers: list[int], seed: int) -> dict[str, Any]:
         found |= {f"times_{number}": made.times, f"values_{number}": made.values.astype(np.float32)}
         held = (made.clock > made.visit.holds_from + 0.8) & (made.clock < made.visit.withdraws)
         found[f"hold_{number}"] = made.pressing[held].mean(0)
+        found[f"kept_{number}"] = significant(made)
     return found
 
 
+def significant(made: Hug) -> bool:
+    """Whether chest and back were pressed while the operator pressed."""
+    touch = made.read[made.wanted.max(1) > 40, len(camera.NAMES) :]
+    chest, back = (_median(touch, groups) for groups in (pads.CHEST, pads.BACK))
+    return bool(chest >= CHEST and back >= BACK)
+
+
+def _median(touch: np.ndarray, groups: Mapping[str, int]) -> float:
+    columns = [pads.NAMES.index(name) for group in groups for name in pads.SENSORS[group]]
+    return float(np.median(touch[:, columns].max(1))) if len(touch) else 0.0
+
+
 def dataset(found: Mapping[str, Mapping[str, Any]]) -> inphase.Dataset:
-    """All that were taught, by number."""
+    """Those that were taught and are kept, by number."""
     arrays = {name: value for part in found.values() for name, value in part.items()}
-    numbers = sorted(int(name.split("_")[1]) for name in arrays if name.startswith("times_"))
+    numbers = sorted(int(name.split("_")[1]) for name in arrays if name.startswith("kept_") and arrays[name])
+    numbers = numbers[:KEPT]
     return inphase.Dataset.from_arrays(
         [arrays[f"times_{n}"] for n in numbers],
         [np.asarray(arrays[f"values_{n}"], dtype=np.float64) for n in numbers],
@@ -60,5 +75,3 @@ def dataset(found: Mapping[str, Mapping[str, Any]]) -> inphase.Dataset:
         names=[f"hug {n}, partner {n % TRAINED}" for n in numbers],
     )
 
-
-__all__ = ["CONTROLLED", "FORCES", "HUGS", "NOVEL", "TRAINED", "camera", "dataset", "people", "some", "taught"]

@@ -6,10 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+import mujoco
 import numpy as np
 
 from experiments.hugging import camera
-from experiments.hugging.pads import ARM, ARMS, NAMES, Pads, contacts, largest
+from experiments.hugging.pads import ARM, ARMS, NAMES, Pads, largest
 from experiments.hugging.partner import Person, Visit
 from experiments.hugging.person import FROM
 from experiments.hugging.retarget import Retargeting
@@ -38,7 +39,8 @@ class Hug:
     """What was recorded. times: (T,) [s]. read: (T, 75). commanded: (T, 12) [rad] and wanted: (T, 8) [raw].
 
     Of every period (P,), which no sensor tells: pressing: (P, 2) [N] of either arm on the partner; pressed: (P,) [N] of
-    all contacts of the partner; near: (P,) [m] the partner from the robot; raised: (P,) [m] the higher hand.
+    all contacts of the partner; near: (P,) [m] the partner from the robot; raised: (P,) [m] the higher hand; holding:
+    (P, 2) [N] of either arm on the partner's trunk; gap: (P,) [m] between the hands, from side to side.
     """
 
     visit: Visit
@@ -51,6 +53,8 @@ class Hug:
     pressed: np.ndarray
     near: np.ndarray
     raised: np.ndarray
+    holding: np.ndarray
+    gap: np.ndarray
 
     @property
     def values(self) -> np.ndarray:
@@ -77,7 +81,7 @@ def hug(
     truth: list[tuple[Any, ...]] = []
     for i in range(round((visit.over_at if until is None else until) / PERIOD)):
         time = i * PERIOD
-        pressing, pressed = sense.on_partner(data)
+        pressing, holding, pressed = sense.on_partner(data)
         near = FROM - float(data.joint("person_forward").qpos[0])
         row, touch = None, pads.read(pads.forces(world, data), data, rng)
         if i % EVERY == 0:
@@ -89,8 +93,8 @@ def hug(
         data.ctrl[world.commanded] = command
         if row is not None:
             rows.append((time, row, command.copy(), wanted))
-        hands = max(float(data.site(f"{side}_hand").xpos[2]) for side in SIDES)
-        truth.append((time, pressing, pressed, near, hands))
+        left, right = (data.site(f"{side}_hand").xpos for side in SIDES)
+        truth.append((time, pressing, pressed, near, max(left[2], right[2]), holding, left[1] - right[1]))
         person.act(time, data, float(pressing.sum()))
         if watch is not None:
             watch(data)
@@ -110,22 +114,25 @@ class Arms:
         self.world, self.pads = world, pads
         self.side = {model.geom(f"{s}_{ARM[part][0]}").id: k for k, s in enumerate(SIDES) for part in ARM}
         self.side |= {model.geom(i).id: k for k, s in enumerate(SIDES) for i in _sphere(model, s)}
+        self.trunk = {model.geom(f"person_{part}").id for part in ("hips", "belly", "ribs", "chest")}
         self.bodies = [model.body(f"{name.split('_')[0]}_{ARM[name.split('_')[1]][1]}").id for name in ARMS]
         self.middle = [(ARM[name.split("_")[1]][2] + ARM[name.split("_")[1]][3]) / 2 for name in ARMS]
 
-    def on_partner(self, data: Any) -> tuple[np.ndarray, float]:
-        """(2,) [N] how hard the left and the right arm press, and all contacts together."""
-        arms, torso = np.zeros(2), 0.0
-        for geom, _, force in contacts(self.world, data, self.side):
-            arms[geom] += force
-        for _, _, force in contacts(self.world, data, {self.world.model.geom("torso").id: 0}):
-            torso += force
-        return arms, float(arms.sum() + torso)
+    def on_partner(self, data: Any) -> tuple[np.ndarray, np.ndarray, float]:
+        """(2,) [N] how hard the left and the right arm press on the partner, (2,) on their trunk, and all together."""
+        arms, trunk, together, wrench = np.zeros(2), np.zeros(2), 0.0, np.zeros(6)
+        for i in range(data.ncon):
+            geoms = (data.contact[i].geom1, data.contact[i].geom2)
+            mujoco.mj_contactForce(self.world.model, data, i, wrench)
+            together += float(wrench[0])
+            for geom in geoms:
+                if geom in self.side:
+                    arms[self.side[geom]] += wrench[0]
+                    trunk[self.side[geom]] += wrench[0] * any(other in self.trunk for other in geoms)
+        return arms, trunk, together
 
     def inward(self, data: Any) -> np.ndarray:
         """(8, 12) [m/rad] how fast every group moves towards whoever stands in front, as a joint turns."""
-        import mujoco
-
         found, jacobian = np.zeros((len(ARMS), len(self.world.columns))), np.zeros((3, self.world.model.nv))
         for k, (body, along) in enumerate(zip(self.bodies, self.middle, strict=True)):
             place = data.xpos[body] + data.xmat[body].reshape(3, 3)[:, 2] * along

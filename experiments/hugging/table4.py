@@ -26,40 +26,57 @@ def split(count: int, folds: int, fold: int) -> tuple[list[int], list[int]]:
 
 
 def cross_validated(
-    taught: Mapping[str, Mapping[str, Any]], way: str, method: str, folds: int, fold: int, calibrate: bool, most: int
+    taught: Mapping[str, Mapping[str, Any]],
+    way: str,
+    methods: Mapping[str, str],
+    folds: int,
+    fold: int,
+    calibrate: bool,
+    most: int,
+    every: int,
 ) -> dict[str, Any]:
-    """One fold: error (hugs, lookaheads, parts), the state's dimension, and what was chosen. most: hugs played."""
+    """One fold: errors (hugs, lookaheads, parts) by method, the state's dimension, and what was chosen.
+
+    most: hugs that are played. every: so many-th row of them is seen.
+    """
     with threadpool_limits(limits=1):
         everything = dataset(taught)
         train, held_out = split(len(everything), folds, fold)
         shown = WAYS[way](everything.subset(train))
-        if method == "as written":
-            model = as_written(shown.dataset, shown.bases)
-        else:
-            model = inphase.fit(shown.dataset, basis=shown.bases, calibrate=calibrate)
-        options = {"members": len(train)} if METHODS[method] == "ebip" and method == "as written" else {}
         played = shown.change(everything.subset(held_out[:most]))
-        session = model.session(METHODS[method], **options)
-        errors, curves = [], {}
-        for number, demonstration in zip(held_out, played, strict=False):
-            said, then, phase = follow(session, demonstration)
-            error = np.abs(said - then)
-            errors.append([[error[:, k, part].mean() for part in PARTS.values()] for k in range(len(LOOKAHEADS))])
-            if not curves:
-                curves = {"said": said, "then": then[:, 0], "times": demonstration.times, "number": number}
-                curves["phase"] = phase
-    return {"error": np.array(errors), "dimension": model.layout.size, "says": shown.says, **curves}
+        found: dict[str, Any] = {"says": shown.says}
+        ours = None
+        for name, filter in methods.items():
+            if name == "as written":
+                model, options = as_written(shown.dataset, shown.bases), {"members": len(train)}
+            else:
+                ours = ours or inphase.fit(shown.dataset, basis=shown.bases, calibrate=calibrate)
+                model, options = ours, {}
+            session, errors = model.session(filter, **options), []
+            for demonstration in played:
+                said, then, phase = follow(session, demonstration, every)
+                error = np.abs(said - then)
+                errors.append([[error[:, k, part].mean() for part in PARTS.values()] for k in range(len(LOOKAHEADS))])
+                if len(errors) == 1:
+                    found |= {f"said {name}": said, "then": then, "times": demonstration.times[::every]}
+                    found |= {f"phase {name}": phase}
+            found[f"error {name}"] = np.array(errors)
+            found["dimension"] = model.layout.size
+    return found
 
 
-def follow(session: inphase.Session, demonstration: inphase.Demonstration) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def follow(
+    session: inphase.Session, demonstration: inphase.Demonstration, every: int = 1
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(T, 3, 20) what is said by look-ahead, (T, 3, 20) what was done so much later, and (T,) the phase estimated."""
     session.reset()
     count = len(session.model.observed)
-    truth, phases = demonstration.values[:, count:], demonstration.phases
+    truth, all_phases = demonstration.values[:, count:], demonstration.phases
+    phases = all_phases[::every]
     later = [np.minimum(phases + ahead, 1.0) for ahead in LOOKAHEADS]
-    then = np.stack([np.stack([np.interp(at, phases, column) for column in truth.T], 1) for at in later], 1)
+    then = np.stack([np.stack([np.interp(at, all_phases, column) for column in truth.T], 1) for at in later], 1)
     said, believed = np.empty_like(then), np.empty(len(phases))
-    for i, (time, row) in enumerate(zip(demonstration.times, demonstration.values, strict=True)):
+    for i, (time, row) in enumerate(zip(demonstration.times[::every], demonstration.values[::every], strict=True)):
         believed[i] = session.observe(time, row[:count]).phase
         for k, ahead in enumerate(LOOKAHEADS):
             said[i, k] = session.respond(lookahead=ahead, samples=1).mean[0]
