@@ -20,7 +20,7 @@ LOOKAHEAD = 0.05  # of the interaction: the operator was late, and joints are
 
 
 def learn(taught: Mapping[str, Mapping[str, Any]], calibrate: bool) -> dict[str, Any]:
-    """The model that goes online, as the bytes of its file: groups, sparse bases, and what the partner does alone."""
+    """The model that goes online, as the bytes of its file: what the partner does, nothing else set."""
     with threadpool_limits(limits=1), tempfile.TemporaryDirectory() as folder:
         shown = partner_alone(dataset(taught))
         path = Path(folder) / "hugging.inphase"

@@ -67,7 +67,9 @@ def add_person(spec: Any, body: Body) -> None:
             name=f"person_{name}", type=mujoco.mjtGeom.mjGEOM_CAPSULE, fromto=[*a, *b], size=[size, 0, 0], mass=mass
         )
         geom.rgba = [float(part) for part in rgba.split()]
-        geom.contype, geom.conaffinity = (2, 1) if touches else (0, 0)
+        limb = any(part in name for part in ("upper", "fore", "hand"))
+        # Arms are steered past the robot's arms by eye, which these have not: they meet its torso alone.
+        geom.contype, geom.conaffinity = (0, 0) if not touches else (4, 0) if limb else (2, 1)
         geom.friction, geom.solref, geom.solimp[:3] = [0.4, 0.005, 0.0001], [0.02, 1], [0.5, 0.95, 0.03]
         return geom
 

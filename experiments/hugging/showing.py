@@ -16,10 +16,10 @@ MOST = 7  # functions of a sparse basis: with sharper ones OLS would take twice 
 
 @dataclass(frozen=True)
 class Shown:
-    """What becomes of a data set, and the bases of its channels. says: what was chosen."""
+    """What becomes of a data set, and the bases of its channels, None for those that are learned. says: what was chosen."""
 
     dataset: inphase.Dataset
-    bases: Basis | dict[str, Basis]
+    bases: Basis | dict[str, Basis] | None
     change: Callable[[inphase.Dataset], inphase.Dataset]
     says: str = ""
 
@@ -46,10 +46,7 @@ def grouped(train: inphase.Dataset) -> Shown:
 
 def grouped_sparse(train: inphase.Dataset) -> Shown:
     """The same, with bases where there is contact."""
-    return _sparse(grouped(train))
-
-
-def _sparse(shown: Shown) -> Shown:
+    shown = grouped(train)
     sparse = inphase.sparse_bases(shown.dataset, ["group_*", "force_*"], most=MOST)
     usual = dict.fromkeys(shown.dataset.names, UNIFORM)
     sizes = [basis.size for basis in sparse.values()]
@@ -60,13 +57,13 @@ TRUNK = inphase.Reduction({f"group_{group}": (SENSORS[group], "max") for group i
 
 
 def partner_alone(train: inphase.Dataset) -> Shown:
-    """Groups with sparse bases of chest and back, which the partner presses; none of the arms, which press themselves."""
+    """Groups of chest and back alone, which the partner presses, and none of the arms, which press themselves."""
 
     def change(dataset: inphase.Dataset) -> inphase.Dataset:
         trunk = [name for group in CHEST | BACK for name in SENSORS[group]]
         return TRUNK.dataset(dataset.select([*camera.NAMES, *trunk]))
 
-    return _sparse(Shown(change(train), UNIFORM, change))
+    return Shown(change(train), None, change)
 
 
 WAYS: dict[str, Callable[[inphase.Dataset], Shown]] = {
@@ -74,5 +71,5 @@ WAYS: dict[str, Callable[[inphase.Dataset], Shown]] = {
     "MIFS": selected,
     "Group": grouped,
     "Group + OLS": grouped_sparse,
-    "Trunk + OLS": partner_alone,
+    "Trunk": partner_alone,
 }

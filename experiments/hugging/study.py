@@ -86,7 +86,7 @@ def _tell_table4(settings: Settings, found: Found, page: Page) -> None:
         def beside(key: object, theirs: bool = theirs) -> dict[str, str]:
             return dict(zip(WAYS, THEIRS[key], strict=False)) if theirs else {}  # type: ignore[index]
 
-        sizes = {way: f"{np.mean([f['dimension'] for f in parts]):.0f}" for way, parts in by_way.items()}
+        sizes = {way: f"{np.mean([f[f'dimension {name}'] for f in parts]):.0f}" for way, parts in by_way.items()}
         table.add("Dimension", sizes, beside("dimension"))
         errors = {way: np.concatenate([f[f"error {name}"] for f in parts]) for way, parts in by_way.items()}
         for k, ahead in enumerate(LOOKAHEADS):
@@ -98,7 +98,7 @@ def _tell_table4(settings: Settings, found: Found, page: Page) -> None:
     page.say(
         "Mean absolute error, joints [rad], forces of the left and the right arm [raw]; **bold** the best of a row, ≈ not "
         "significantly worse (Mann and Whitney's U, p < 0.05); in brackets the dissertation's. The last column leaves "
-        "out the sensors of the robot's own arms: it is what goes online."
+        "out the sensors of the robot's own arms: it is what goes online, with the bases that `inphase.fit` chooses where it fits."
     )
     chosen = [str(f["says"]) for f in by_way["MIFS"]]
     page.say("MIFS, by fold: " + "; ".join(chosen) + ".")

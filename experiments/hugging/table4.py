@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 import inphase
 from experiments.hugging.demonstrations import FORCES, TRAINED, dataset
-from experiments.hugging.showing import WAYS
+from experiments.hugging.showing import UNIFORM, WAYS
 from experiments.hugging.world import JOINTS
 from experiments.study.as_written import as_written
 
@@ -48,7 +48,7 @@ def cross_validated(
         ours = None
         for name, filter in methods.items():
             if name == "as written":
-                model, options = as_written(shown.dataset, shown.bases), {"members": len(train)}
+                model, options = as_written(shown.dataset, shown.bases or UNIFORM), {"members": len(train)}
             else:
                 ours = ours or inphase.fit(shown.dataset, basis=shown.bases, calibrate=calibrate)
                 model, options = ours, {}
@@ -61,7 +61,7 @@ def cross_validated(
                     found |= {f"said {name}": said, "then": then, "times": demonstration.times[::every]}
                     found |= {f"phase {name}": phase}
             found[f"error {name}"] = np.array(errors)
-            found["dimension"] = model.layout.size
+            found[f"dimension {name}"] = model.layout.size
     return found
 
 
