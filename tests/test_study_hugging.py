@@ -27,8 +27,8 @@ def room():
 
 @pytest.fixture(scope="module")
 def made():
-    """One hug of every person who teaches."""
-    return [taught(number, 0) for number in range(4)]
+    """A hug each of three who teach."""
+    return [taught(number, 0) for number in range(3)]
 
 
 def test_the_arm_is_the_panda_of_its_published_parameters(room):
@@ -64,7 +64,8 @@ def test_arms_at_rest_are_carried_by_their_motors(room):
     for side in ("left", "right"):
         np.testing.assert_allclose([data.joint(f"{side}_{i}").qpos[0] for i in range(1, 8)], REST[side], atol=1e-3)
     pulled = [abs(data.actuator(f"left_{i}").force[0]) for i in range(1, 8)]
-    assert max(pulled) > 0 and all(pulled[i] <= (87 if i < 4 else 12) for i in range(7))
+    assert max(pulled) > 0
+    assert all(pulled[i] <= (87 if i < 4 else 12) for i in range(7))
 
 
 def test_sixty_one_pads_share_what_presses(room):
@@ -82,7 +83,9 @@ def test_sixty_one_pads_share_what_presses(room):
     assert 0.3 * pressed < felt[chest].sum() <= pressed * (1 + 1e-9)
     assert felt.sum() == pytest.approx(felt[chest].sum() + felt[-13:].sum())
     raw = sensors.read(felt, data, np.random.default_rng(0))
-    assert raw.min() >= 0 and raw.max() <= 255 and (raw == np.round(raw)).all()
+    assert raw.min() >= 0
+    assert raw.max() <= 255
+    assert (raw == np.round(raw)).all()
 
 
 def test_the_robots_push_is_the_partners_push(room):
@@ -138,13 +141,17 @@ def test_the_camera_sees_what_is_not_hidden(room):
     for name in ("left_swing", "right_swing"):
         data.joint(f"person_{name}").qpos = 0.3
         data.joint(f"person_{name.replace('swing', 'bend')}").qpos = 1.5
-        data.joint(f"person_{name.replace('swing', 'twist')}").qpos = 0.9
+        data.joint(f"person_{name.replace('swing', 'twist')}").qpos = -1.0
     mujoco.mj_forward(room.model, data)
     hidden = dict(zip(camera.POINTS, pose.hidden(data), strict=True))
-    assert hidden["left_wrist"] and hidden["right_wrist"] and not hidden["neck"]
-    frames = [pose.frame(data) for _ in range(4)]
-    assert np.isnan(frames[0]).all() and np.isnan(frames[1]).all()  # they come two frames late
-    assert np.isnan(frames[3][2 * camera.POINTS.index("left_wrist")])
+    assert hidden["left_wrist"]
+    assert hidden["right_wrist"]
+    assert not hidden["neck"]
+    frames = [pose.frame(data) for _ in range(30)]
+    assert np.abs(np.nanmean([frame[:2] for frame in frames[2:]], axis=0)).max() < 15  # from the first neck
+    assert np.isnan(frames[0]).all()
+    assert np.isnan(frames[1]).all()
+    assert np.isnan(frames[9][2 * camera.POINTS.index("left_wrist")])
 
 
 def test_hugs_that_are_taught_succeed(made):

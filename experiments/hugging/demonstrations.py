@@ -74,4 +74,3 @@ def dataset(found: Mapping[str, Mapping[str, Any]]) -> inphase.Dataset:
         groups={"pose_*": "pose", "touch_*": "touch", "force_*": "force", "joint_*": "joint"},
         names=[f"hug {n}, partner {n % TRAINED}" for n in numbers],
     )
-

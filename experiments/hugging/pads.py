@@ -1,8 +1,8 @@
 """The 61 force sensors in the robot's padding (Figs. 25, 26): where they are, and what they read.
 
-A contact presses on every sensor near it, the less the further away: a sensor feels what padding passes on. Readings are
-those of an 8-bit converter behind a resistor that gives way with force, 0 … 255; padding that an arm bends by moving is
-felt, too, as in 3.2.2.
+A contact presses on every sensor near it, the less the further away: a sensor feels what padding passes on. Readings
+are those of an 8-bit converter behind a resistor that gives way with force, 0 … 255; padding that an arm bends by
+moving is felt, too, as in 3.2.2.
 """
 
 from __future__ import annotations
@@ -30,7 +30,11 @@ PASSED_ON = 0.045  # [m] how far padding passes a force on
 GAP = 0.5  # a contact that is further from all sensors than this sum of shares is felt in part
 HALF = 30.0  # [N] at which a sensor reads half of all it can
 LARGEST, REST, TREMBLE = 255, 3.0, 1.0  # [raw]
-CREASES = {"wrist": (6, 14.0), "fore": (4, 12.0), "upper": (4, 10.0)}  # by segment: the joint that bends it, [raw s/rad]
+CREASES = {
+    "wrist": (6, 14.0),
+    "fore": (4, 12.0),
+    "upper": (4, 10.0),
+}  # by segment: the joint that bends it, [raw s/rad]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,14 @@ from experiments.hugging.person import ARM_JOINTS, FROM, TRUNK, Body
 from experiments.hugging.reach import reach
 from experiments.hugging.world import PERIOD, World
 
-SHIRTS = ("0.80 0.40 0.27 1", "0.36 0.56 0.42 1", "0.80 0.62 0.24 1", "0.47 0.40 0.62 1", "0.70 0.35 0.42 1", "0.42 0.52 0.66 1")
-KINDS = ("usual", "long", "short", "nothing", "late", "raised", "air", "apart")
+SHIRTS = (
+    "0.80 0.40 0.27 1",
+    "0.36 0.56 0.42 1",
+    "0.80 0.62 0.24 1",
+    "0.47 0.40 0.62 1",
+    "0.70 0.35 0.42 1",
+    "0.42 0.52 0.66 1",
+)
 CHEST = 0.095  # [m] where the robot's chest is
 DOWN = {"swing": 0.05, "spread": 0.10, "twist": 0.0, "bend": 0.15}
 

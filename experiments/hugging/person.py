@@ -5,7 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-SKIN, HAIR, SHIRT, TROUSERS, SHOES = "0.87 0.68 0.55 1", "0.25 0.17 0.12 1", "0.80 0.40 0.27 1", "0.25 0.29 0.38 1", "0.15 0.15 0.17 1"
+SKIN, HAIR, SHIRT, TROUSERS, SHOES = (
+    "0.87 0.68 0.55 1",
+    "0.25 0.17 0.12 1",
+    "0.80 0.40 0.27 1",
+    "0.25 0.29 0.38 1",
+    "0.15 0.15 0.17 1",
+)
 FROM = 2.0  # [m] away from the robot's axis
 # Springs: [N/m] or [N m/rad], damping, and what they can do at most. A person gives way when squeezed, a little.
 TRUNK = {

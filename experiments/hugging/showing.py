@@ -16,7 +16,7 @@ MOST = 7  # functions of a sparse basis: with sharper ones OLS would take twice 
 
 @dataclass(frozen=True)
 class Shown:
-    """What becomes of a data set, and the bases of its channels, None for those that are learned. says: what was chosen."""
+    """What becomes of a data set, and its bases, None for those that are learned. says: what was chosen."""
 
     dataset: inphase.Dataset
     bases: Basis | dict[str, Basis] | None
