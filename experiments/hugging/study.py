@@ -97,8 +97,8 @@ def _tell_table4(settings: Settings, found: Found, page: Page) -> None:
         page.table(table)
     page.say(
         "Mean absolute error, joints [rad], forces of the left and the right arm [raw]; **bold** the best of a row, ≈ "
-        "not significantly worse (Mann and Whitney's U, p < 0.05); in brackets the dissertation's. The last column leaves "
-        "out the sensors of the robot's own arms: it is what goes online, with the bases that "
+        "not significantly worse (Mann and Whitney's U, p < 0.05); in brackets the dissertation's. The last column "
+        "leaves out the sensors of the robot's own arms: it is what goes online, with the bases that "
         "`inphase.fit` chooses where it fits."
     )
     chosen = [str(f["says"]) for f in by_way["MIFS"]]
@@ -158,11 +158,11 @@ def _tell_online(settings: Settings, found: Found, page: Page) -> None:
     table.add("**together**", cells | {"all": f"{sum(together)} of {len(together)}"}, theirs)
     page.table(table)
     page.say(
-        "In brackets the dissertation's, where novel partners were hugged well 35 of 44 times. What is asked of a hug is "
-        "in `experiments/hugging/success.py`: *gentle*: no arm presses with more than 150 N for a quarter of a second; "
+        "In brackets the dissertation's, where novel partners were hugged well 35 of 44 times. What is asked of a hug "
+        "is in `experiments/hugging/success.py`: *gentle*: no arm presses with more than 150 N for a quarter of a second; "
         "*holds*: both arms press on the partner for 70 % of the time they hold, from one second after their arms are "
         "around the robot; *lets go*: nothing holds them 1.5 s after they begin to withdraw; *waits*: arms stay down, "
-        "or open, until the partner comes; *does not hug*, *does not close*: nothing is done to somebody who stays away."
+        "or open, until the partner comes; *does not hug*, *does not close*: nothing is done to who stays away."
     )
     page.picture(pictures.edge_cases(found), "fig33", "Phase and its velocity in edge cases")
     page.picture(pictures.forces(found), "fig35", "Contact forces, wanted and felt")
@@ -189,8 +189,8 @@ STUDY = Study(
     says=(
         "Two padded arms of seven joints with 61 force sensors hug a person, in MuJoCo. Four people teach it with the "
         "help of a scripted teleoperator; online, what the model says of 12 joints and 8 contact forces goes to a "
-        "retargeting controller (3.2.1), which changes the joints until contact is as strong as it is wanted. People, camera, and "
-        "operator are made up: `experiments/hugging/README.md` says how."
+        "retargeting controller (3.2.1), which changes the joints until contact is as strong as it is "
+        "wanted. People, camera, and operator are made up: `experiments/hugging/README.md` says how."
     ),
     parts={
         "taught": Part("Hugs that are taught", _taught, _tell_taught),
