@@ -63,9 +63,14 @@ def test_arms_at_rest_are_carried_by_their_motors(room):
         room.run(data)
     for side in ("left", "right"):
         np.testing.assert_allclose([data.joint(f"{side}_{i}").qpos[0] for i in range(1, 8)], REST[side], atol=1e-3)
-    pulled = [abs(data.actuator(f"left_{i}").force[0]) for i in range(1, 8)]
-    assert max(pulled) > 0
-    assert all(pulled[i] <= (87 if i < 4 else 12) for i in range(7))
+    # Gravity is carried by the motors, whose torque has limits, and by nothing else.
+    pulled = np.array([data.joint(f"left_{i}").qfrc_actuator[0] for i in range(1, 8)])
+    weighs = np.array([data.joint(f"left_{i}").qfrc_bias[0] for i in range(1, 8)])
+    assert np.abs(weighs).max() > 2
+    np.testing.assert_allclose(pulled, weighs, atol=0.1)
+    data.actuator("left_5").ctrl = data.joint("left_5").qpos[0] + 2.0
+    room.run(data)
+    assert abs(data.joint("left_5").qfrc_actuator[0]) <= 12
 
 
 def test_sixty_one_pads_share_what_presses(room):
@@ -80,7 +85,7 @@ def test_sixty_one_pads_share_what_presses(room):
     felt = sensors.forces(room, data)
     chest = [pads.NAMES.index(name) for group in pads.CHEST for name in pads.SENSORS[group]]
     assert pressed > 10
-    assert 0.3 * pressed < felt[chest].sum() <= pressed * (1 + 1e-9)
+    assert 0.3 * pressed < felt[chest].sum() <= pressed * (1 + 1e-9)  # what is far from all of them is felt in part
     assert felt.sum() == pytest.approx(felt[chest].sum() + felt[-13:].sum())
     raw = sensors.read(felt, data, np.random.default_rng(0))
     assert raw.min() >= 0

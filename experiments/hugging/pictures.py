@@ -71,7 +71,7 @@ def edge_cases(found: Found) -> Figure:
         axes[2, column].set_xlabel("phase velocity [1/s]")
         for axis in axes[:, column]:
             plain(axis)
-    for axis, label in zip(axes[:, 0], ("right shoulder y [px]", "density", "density"), strict=True):
+    for axis, label in zip(axes[:, 0], ("right shoulder y [px]", "relative density", "relative density"), strict=True):
         axis.set_ylabel(label)
     return figure
 
@@ -101,7 +101,7 @@ def forces(found: Found) -> Figure:
         axes[row, 1].plot(one["times"], touch[:, back].max(1), color=INK, lw=1.2)
         axes[row, 0].set_ylabel("left hand [raw]")
         axes[row, 1].set_ylabel("back [raw]")
-        axes[row, 0].set_title(label.replace("-", " ").split("/")[0], fontsize=9, loc="left")
+        axes[row, 0].set_title(label.replace("-", " ").split("/")[1], fontsize=9, loc="left")
         for axis in axes[row]:
             plain(axis)
     for axis in axes[-1]:

@@ -31,8 +31,8 @@ HEADINGS = {
 }
 FPS = 12
 FILTERS = ("rbpf", "ebip")  # online
-QUICK_HUGS, QUICK_FOLDS, QUICK_PLAYED, QUICK_EVERY = 24, 2, 1, 3
-QUICK_CASES = {"long": 1, "short": 1, "nothing": 1}
+QUICK_HUGS, QUICK_FOLDS, QUICK_PLAYED, QUICK_EVERY = 20, 2, 1, 5
+QUICK_CASES = {"long": 1, "nothing": 1}
 
 
 def _taught(settings: Settings) -> dict[str, Task]:
