@@ -49,8 +49,8 @@ class Stored(Mapping[str, Arrays]):
     def keep(self, label: str, result: Mapping[str, Any], made_by: str, seconds: float) -> None:
         """Write a result whole, with the digest of what made it and how long that took [s]."""
         path = self.path(label)
-        if taken := {MADE_BY, SECONDS} & set(result):
-            raise ValueError(f"{min(taken)} is a name of its own")
+        if taken := {MADE_BY, SECONDS, "file", "allow_pickle"} & set(result):
+            raise ValueError(f"{min(taken)} names something else here: call the result otherwise")
         path.parent.mkdir(parents=True, exist_ok=True)
         arrays = {name: np.asarray(value) for name, value in result.items()}
         arrays |= {MADE_BY: np.asarray(made_by), SECONDS: np.asarray(seconds)}
