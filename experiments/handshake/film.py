@@ -57,7 +57,7 @@ def strip(films: Mapping[str, np.ndarray]) -> Figure:
 
     columns = 7
     height, width = next(iter(films.values())).shape[1:3]
-    figure = New(figsize=(2.1 * columns, 2.1 * columns * height / width / columns * len(films) + 0.3))
+    figure = New(figsize=(2.1 * columns, 2.1 * columns * height / width / columns * len(films) + 0.6))
     axes = figure.subplots(len(films), columns, squeeze=False)
     for row, (name, frames) in zip(axes, films.items(), strict=True):
         for i, ax in enumerate(row):
@@ -66,5 +66,5 @@ def strip(films: Mapping[str, np.ndarray]) -> Figure:
             ax.set_axis_off()
             if i == 0:
                 ax.set_title(name, fontsize=10, loc="left")
-    figure.subplots_adjust(0.005, 0.005, 0.995, 0.95, wspace=0.02, hspace=0.08)
+    figure.subplots_adjust(0.005, 0.005, 0.995, 0.94, wspace=0.02, hspace=0.16)
     return figure
