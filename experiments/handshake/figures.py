@@ -10,7 +10,7 @@ from experiments.handshake.anatomy import NAMES, STILL
 from experiments.handshake.measures import correlations, sliding
 from experiments.handshake.partner import SPEEDS
 from experiments.handshake.sensors import HAND, RATE
-from experiments.handshake.tell import LED, trials
+from experiments.handshake.tell import LED, played, trials
 from experiments.handshake.tell import NAMES as METHODS
 from experiments.handshake.trajectories import TESTING
 from experiments.study import Found, Page, Settings, Table
@@ -39,10 +39,11 @@ def phase(settings: Settings, found: Found, page: Page) -> None:
     for method in SHOWN:
         page.picture(_regions(settings, method), f"phase-{method}", f"phase at the ends of three regions, {method}")
     page.picture(_distributions(settings), "phase-all", "phase and velocity when the partner has arrived")
-    table = Table("when the partner has arrived, mean ± std", list(METHODS.values()))
+    methods = played(leading)
+    table = Table("when the partner has arrived, mean ± std", list(methods.values()))
     rows: dict[str, dict[str, str]] = {}
     ratios = {}
-    for method, column in METHODS.items():
+    for method, column in methods.items():
         at = {s: trials(leading, i, len(LED), "at_moments", method)[0] for i, s in enumerate(LED)}
         for speed in ("fast", "normal", "slow", "paused"):
             green = at[speed][:, 1]
@@ -101,10 +102,11 @@ def _density(ax: object, mean: float, std: float, limits: tuple[float, float], c
 
 
 def _distributions(settings: Settings) -> Figure:
-    """The left of Fig. 16, of all tests, for the three methods."""
+    """The left of Fig. 16, of all tests, for every method."""
     leading = settings.of("leading")
-    figure, axes = _figure(2, len(METHODS), (10, 4.6), sharey=False)
-    for j, (method, title) in enumerate(METHODS.items()):
+    methods = played(leading)
+    figure, axes = _figure(2, len(methods), (10, 4.6), sharey=False)
+    for j, (method, title) in enumerate(methods.items()):
         axes[0, j].set_title(title, fontsize=10)
         for k, (row, name, limits) in enumerate(((0, "phase", (0, 1)), (2, "phase velocity [1/s]", (-0.1, 0.6)))):
             ax = axes[k, j]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from experiments.handshake.demonstrations import familiar
 from experiments.handshake.measures import MET, at_end, met_at
 from experiments.handshake.measures import completion as time_to_completion
 from experiments.handshake.trajectories import TESTING
-from experiments.handshake.work import MODELS
 from experiments.study import Found, Page, Settings, Table
 from experiments.study.stored import Stored
 from experiments.study.table import SIGNIFICANT, marked
@@ -47,15 +48,21 @@ def trials(stored: Stored, which: int, kinds: int, name: str, method: str = "") 
     return np.concatenate(values), np.array(who)
 
 
+def played(leading: Found) -> dict[str, str]:
+    """The methods that led, with what they are called in tables."""
+    return {method: name for method, name in NAMES.items() if any(label.startswith(f"{method}/") for label in leading)}
+
+
 def met(settings: Settings, found: Found, page: Page) -> None:
     """Distances, which the dissertation could not measure."""
     static, leading = settings.of("static"), settings.of("leading")
-    table = Table(f"share of hands within {100 * MET:.0f} cm at the end; median distance [cm]", list(NAMES.values()))
-    times = Table("time until then [s], of those", list(NAMES.values()))
-    shares: dict[str, list[np.ndarray]] = {method: [] for method in MODELS}
+    methods = played(leading)
+    table = Table(f"share of hands within {100 * MET:.0f} cm at the end; median distance [cm]", list(methods.values()))
+    times = Table("time until then [s], of those", list(methods.values()))
+    shares: dict[str, list[np.ndarray]] = {method: [] for method in methods}
     for i, speed in enumerate(LED):
         cells, soon = {}, {}
-        for method, column in NAMES.items():
+        for method, column in methods.items():
             truth, _ = trials(leading, i, len(LED), "truth", method)
             distance = ends_apart(truth)
             if speed == "still":
@@ -72,7 +79,7 @@ def met(settings: Settings, found: Found, page: Page) -> None:
     every = {method: np.concatenate(d) for method, d in shares.items()}
     table.add(
         "all who moved",
-        {NAMES[m]: f"{np.mean(d < MET):.0%}; {100 * np.median(d):.1f}" for m, d in every.items()},
+        {methods[m]: f"{np.mean(d < MET):.0%}; {100 * np.median(d):.1f}" for m, d in every.items()},
     )
     page.table(table)
     page.table(times)
@@ -81,23 +88,23 @@ def met(settings: Settings, found: Found, page: Page) -> None:
         f"Against static trajectories, where the person does all the work: {np.mean(followed < MET):.0%}; "
         f"{100 * np.median(followed):.1f} cm. Who leads waits at the place of their own choice and does not help."
     )
-    held = {m: int(sum(leading[f"{m}/person{p}"]["held"].sum() for p in persons(leading))) for m in MODELS}
-    page.say(
-        "The live loop held the robot back " + ", ".join(f"{held[m]} times with {m}" for m in ("ebip", "rbpf")) + "."
-    )
+    held = {m: int(sum(leading[f"{m}/person{p}"]["held"].sum() for p in persons(leading))) for m in methods}
+    ours = [m for m in methods if m != "bip"]
+    page.say("The live loop held the robot back " + ", ".join(f"{held[m]} times with {m}" for m in ours) + ".")
 
 
 def completion(settings: Settings, found: Found, page: Page) -> None:
     """Table 1, for all methods."""
     static, leading = settings.of("static"), settings.of("leading")
-    read = {f"{m}, {s}": trials(leading, i, len(LED), "read", m) for m in MODELS for i, s in enumerate(LED[:3])}
+    methods = played(leading)
+    read = {f"{m}, {s}": trials(leading, i, len(LED), "read", m) for m in methods for i, s in enumerate(LED[:3])}
     read |= {f"static {i + 1}": trials(static, i, len(TESTING), "read") for i in range(len(TESTING))}
     scored = {name: (np.array([time_to_completion(r) for r in values]), who) for name, (values, who) in read.items()}
     columns = ["mean / variance (All)", "(T)", "(NT)"]
     rows: dict[str, list[str]] = {name: [] for name in scored}
     for chosen in (lambda p: True, familiar, lambda p: not familiar(p)):
         values = {name: s[np.array([chosen(p) for p in who])] for name, (s, who) in scored.items()}
-        for method in MODELS:  # each method is compared with the static scenarios, as the dissertation's was
+        for method in methods:  # each method is compared with the static scenarios, as the dissertation's was
             rivals = {n: v for n, v in values.items() if n.startswith((method, "static")) and len(v)}
             marks = marked(rivals)
             for name, v in rivals.items():
@@ -113,10 +120,10 @@ def completion(settings: Settings, found: Found, page: Page) -> None:
         "Shares of the 10 s, beside the dissertation's numbers. **Bold**: the smallest of a column among one method "
         f"and the static scenarios (theirs as compared with bip); ≈: not significantly larger (U test, {SIGNIFICANT})."
     )
-    _compared(scored, page)
+    _compared(scored, methods, page)
 
 
-def _compared(scored: dict[str, tuple[np.ndarray, np.ndarray]], page: Page) -> None:
+def _compared(scored: dict[str, tuple[np.ndarray, np.ndarray]], methods: Iterable[str], page: Page) -> None:
     """All led tests at normal and fast speed against all static ones, for those who have met the robot or have not."""
     from scipy.stats import mannwhitneyu
 
@@ -124,7 +131,7 @@ def _compared(scored: dict[str, tuple[np.ndarray, np.ndarray]], page: Page) -> N
     for group, chosen in (("trained it", familiar), ("had not", lambda p: not familiar(p))):
         values = {name: s[np.array([chosen(p) for p in who])] for name, (s, who) in scored.items()}
         static = np.concatenate([v for name, v in values.items() if name.startswith("static")])
-        for method in MODELS:
+        for method in methods:
             led = np.concatenate([values[f"{method}, {speed}"] for speed in LED[:2]])
             p = mannwhitneyu(led, static).pvalue
             said.append(f"{method} {led.mean():.3f} against {static.mean():.3f} (p = {p:.2g}) for those who {group}")
