@@ -8,12 +8,13 @@ import numpy as np
 
 from experiments.cooperation.demonstrations import PLACES
 from experiments.cooperation.guide import led
-from experiments.cooperation.methods import JOINTS, METHODS, Follower
+from experiments.cooperation.methods import JOINTS, METHODS
 from experiments.cooperation.plan import plan
 from experiments.cooperation.sensors import TICK
 from experiments.cooperation.tasks import learned
 from experiments.cooperation.trial import Robot, act, leading
 from experiments.study import Settings, Stored
+from experiments.study.follower import Follower
 
 LED = "led"  # by whoever demonstrates: the best there is
 TAU = 0.06  # [s] within which the servos are led to a new answer

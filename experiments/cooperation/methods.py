@@ -2,52 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Mapping
 
 import numpy as np
 
 import inphase
 from experiments.cooperation.sensors import CONTROLLED, GROUPS
-from experiments.study.interaction_primitive import InteractionPrimitive
+from experiments.study.follower import AHEAD, MARKS, OURS, WRITTEN, Method, filtered, warped_in_time
 
-MARKS = 20  # moments of an interaction at which the rest of it is foretold
-AHEAD = 20  # points of the rest
 JOINTS = len(GROUPS["arm"])  # of the controlled channels
-
-
-class Follower(Protocol):
-    """Takes in samples, and foretells."""
-
-    def observe(self, time: float, values: np.ndarray) -> float:
-        """The phase."""
-
-    def foretell(self) -> np.ndarray:
-        """(AHEAD, 7) what the robot is going to do, from now to the end."""
-
-
-class _Session:
-    def __init__(self, session: inphase.Session) -> None:
-        self.session = session
-
-    def observe(self, time: float, values: np.ndarray) -> float:
-        return self.session.observe(time, values).phase
-
-    def foretell(self) -> np.ndarray:
-        return self.session.respond(samples=AHEAD).mean
-
-
-class _Primitive:
-    def __init__(self, model: inphase.Model) -> None:
-        self.primitive = InteractionPrimitive(model)
-        self.columns = [model.names.index(name) for name in CONTROLLED]
-
-    def observe(self, time: float, values: np.ndarray) -> float:
-        return self.primitive.observe(time, values)
-
-    def foretell(self) -> np.ndarray:
-        return self.primitive.expect(np.linspace(self.primitive.phase, 1.0, AHEAD))[:, self.columns]
 
 
 class _Blind:
@@ -65,29 +28,16 @@ class _Blind:
         return self.model.predict(np.linspace(self.phase, 1.0, AHEAD))[:, self.columns]
 
 
-@dataclass(frozen=True)
-class Method:
-    """How one follows. model: the name of the model it takes. make: of a model and a seed."""
-
-    model: str
-    make: Callable[[inphase.Model, int], Follower]
-
-
-def _filtered(model: str, name: str) -> Method:
-    return Method(model, lambda learned, seed: _Session(learned.session(name, seed=seed)))
-
-
-WRITTEN, OURS = "as_written", "calibrated"
 METHODS = {
     "mean": Method(OURS, lambda model, seed: _Blind(model)),
-    "IP, DTW": Method(WRITTEN, lambda model, seed: _Primitive(model)),
-    "BIP": _filtered(WRITTEN, "bip"),
-    "eBIP": _filtered(WRITTEN, "ebip"),
-    "particle": _filtered(WRITTEN, "particle"),
-    "BIP, calibrated": _filtered(OURS, "bip"),
-    "eBIP, calibrated": _filtered(OURS, "ebip"),
-    "promp, calibrated": _filtered(OURS, "promp"),
-    "rbpf": _filtered(OURS, "rbpf"),
+    "IP, DTW": warped_in_time(WRITTEN),
+    "BIP": filtered(WRITTEN, "bip"),
+    "eBIP": filtered(WRITTEN, "ebip"),
+    "particle": filtered(WRITTEN, "particle"),
+    "BIP, calibrated": filtered(OURS, "bip"),
+    "eBIP, calibrated": filtered(OURS, "ebip"),
+    "promp, calibrated": filtered(OURS, "promp"),
+    "rbpf": filtered(OURS, "rbpf"),
 }
 
 

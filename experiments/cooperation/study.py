@@ -9,8 +9,9 @@ import numpy as np
 from experiments.cooperation import live, tasks
 from experiments.cooperation.demonstrations import AT_ONCE, DEMONSTRATIONS, PLACES, record
 from experiments.cooperation.figures import TITLES, draw_costs, draw_errors, strip
-from experiments.cooperation.methods import MARKS, METHODS, OURS, WRITTEN
+from experiments.cooperation.methods import METHODS
 from experiments.study import Cell, Found, Page, Part, Settings, Study, Table, Task, task
+from experiments.study.follower import MARKS, OURS, WRITTEN
 
 RATIOS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 4.0)
 TIMED = (0.25, 0.5, 1.0, 2.0, 4.0)

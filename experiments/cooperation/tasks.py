@@ -9,10 +9,11 @@ import numpy as np
 
 import inphase
 from experiments.cooperation.demonstrations import distorted, recorded, without
-from experiments.cooperation.methods import METHODS, WRITTEN, followed
+from experiments.cooperation.methods import METHODS, followed
 from experiments.cooperation.sensors import OBSERVED
 from experiments.study import Settings, Stored
 from experiments.study.as_written import as_written
+from experiments.study.follower import WRITTEN
 from experiments.study.models import packed, unpacked
 from inphase.basis import Gaussian
 

@@ -8,9 +8,10 @@ import numpy as np
 
 from experiments.handwriting import tasks
 from experiments.handwriting.figures import draw_costs, draw_errors
-from experiments.handwriting.methods import MARKS, METHODS
+from experiments.handwriting.methods import METHODS
 from experiments.handwriting.strokes import SAMPLES, shapes
 from experiments.study import Cell, Found, Page, Part, Settings, Study, Table, Task, task
+from experiments.study.follower import MARKS
 
 RATIOS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0)  # of a length, 25 to 400 samples
 SHARES = tuple(range(1, MARKS, 2))  # of the marks: 0.1, 0.2 … of a stroke

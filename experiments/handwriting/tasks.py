@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 import inphase
-from experiments.handwriting.methods import METHODS, OURS, WRITTEN, followed
+from experiments.handwriting.methods import METHODS, followed
 from experiments.handwriting.strokes import (
     NOISE,
     SAMPLES,
@@ -23,6 +23,7 @@ from experiments.handwriting.strokes import (
 )
 from experiments.study import Settings, Stored
 from experiments.study.as_written import as_written
+from experiments.study.follower import OURS, WRITTEN
 from experiments.study.models import packed, unpacked
 from inphase.basis import Gaussian
 
