@@ -11,6 +11,7 @@ from interactions import shapes_unchecked, wobble
 from inphase.basis import Gaussian, Layout, Polynomial
 from inphase.errors import OptionError
 from inphase.noise import Noise
+from inphase.training import discrepancy
 from inphase.training.discrepancy import leave_one_out
 from inphase.training.noise import both, regression_noise
 
@@ -226,3 +227,19 @@ def test_noises_of_two_sources_add_up() -> None:
     np.testing.assert_array_equal(total.var, [4.0, 4.0])
     # The integral of the autocovariance of a sum of independent processes is the sum of theirs.
     np.testing.assert_allclose(total.var * total.correlation_time, [1 * 0.1 + 3 * 0.5, 2 * 0.2])
+
+
+def test_only_what_a_demonstration_saw_speaks_for_it(rng):
+    """Against the regression on the others' directions written out, each demonstration with gaps of its own."""
+    count, shown, var = 6, np.array([1.0, 1.0, 0.0]), np.array([0.3, 0.1, 0.2])
+    curves, known = rng.normal(size=(count, 20, 3)), rng.random((count, 20, 3)) > 0.3
+    target, explained = discrepancy._by_the_others(curves, shown, var, known)
+    for i in range(count):
+        others = np.delete(curves, i, axis=0)
+        mean = others.mean(0)
+        directions = (others - mean).reshape(count - 1, -1) / np.sqrt(count - 2)
+        precision = (known[i] * shown / var / 20).ravel()
+        off = (curves[i] - mean).ravel()
+        along = np.linalg.solve(directions * precision @ directions.T + np.eye(count - 1), directions * precision @ off)
+        np.testing.assert_allclose(target[i].ravel(), off, atol=1e-12)
+        np.testing.assert_allclose(explained[i].ravel(), along @ directions, atol=1e-10)
