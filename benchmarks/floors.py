@@ -14,7 +14,7 @@ from scipy.linalg.lapack import dpotrf, dpotrs
 import inphase
 from inphase.filters.alignment import NODES
 from inphase.filters.promp import PHASES
-from inphase.filters.rbpf import AT_ONCE, Rbpf
+from inphase.filters.rbpf import Rbpf
 
 Array = np.ndarray
 RNG = np.random.default_rng(0)
@@ -76,21 +76,16 @@ def bip(model: inphase.Model, members: int, seen: int) -> Callable[[], object]:
 
 
 def rbpf(model: inphase.Model, members: int, seen: int) -> Callable[[], object]:
-    """For every particle H, H Σ, S and its factor, and what is taken from Σ, a few readings at a time."""
+    """For every particle H, what a sample says of the weights, and the factor of all that was said."""
     basis, phases, directions = model.layout.bases[0], RNG.random(members), len(Rbpf(model).directions.rows)
     weights = RNG.random((basis.size, directions * seen))
-    covs = np.tile(some_cov(directions), (members, 1, 1))
-    lots = [min(AT_ONCE, seen - first) for first in range(0, seen, AT_ONCE)]
-    across = {lot: RNG.random((members, lot, directions)) for lot in lots}
-    innovation_covs = {lot: np.tile(some_cov(lot), (members, 1, 1)) for lot in lots}
+    information = np.tile(some_cov(directions + 1), (members, 1, 1))
+    scaled = RNG.random((members, directions + 1, seen))
 
     def work() -> None:
         basis(phases) @ weights
-        for lot in lots:
-            cross = across[lot] @ covs
-            cross @ across[lot].transpose(0, 2, 1)
-            np.linalg.cholesky(innovation_covs[lot])
-            cross.transpose(0, 2, 1) @ cross
+        scaled @ scaled.transpose(0, 2, 1)
+        np.linalg.cholesky(information)
 
     return work
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from chance import Extent
 
-DIRECTIONS = 24  # that rbpf follows, at most
+DIRECTIONS = 64  # that rbpf follows, at most
 
 
 def ebip(extent: Extent) -> float:
@@ -37,9 +37,9 @@ def particle(extent: Extent) -> float:
 
 
 def rbpf(extent: Extent) -> float:
-    """For every particle rows of H R M b, Σ Hᵀ and covariance R² M."""
+    """For every particle rows of H R M b, what they say of the weights R² M, and its factor R³ / 3."""
     r, m = min(extent.demonstrations - 1, extent.weights, DIRECTIONS), extent.observed
-    return extent.members * (r * m * extent.basis + 2 * r**2 * m + 2 * innovation(m, r))
+    return extent.members * (r * m * extent.basis + r**2 * m + r**3 / 3)
 
 
 def innovation(readings: int, samples: int) -> float:

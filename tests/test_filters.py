@@ -230,7 +230,7 @@ def test_with_the_phase_known_rbpf_is_linear_regression(
 ) -> None:
     monkeypatch.setattr(tempo, "PHASE_JITTER", 0.0)
     monkeypatch.setattr(rbpf, "VARIANCE_KEPT", 1.0)
-    steady = Tempo(usual_std=0.0, other_std=0.0, momentary_std=0.0, stop_rate=0.0)
+    steady = Tempo(usual_std=0.0, other_std=0.0, momentary_std=0.0, stop_rate=0.0, leap_rate=0.0)
     model = dataclasses.replace(chance_model(rng, known_phase(0.8, start=0.1)), tempo=steady)
     steps = samples(model, rng, count=40, mean_dt=0.02)
     mean, cov, log_likelihood = closed_form(model, steps, 0.1, 0.8)
@@ -241,6 +241,34 @@ def test_with_the_phase_known_rbpf_is_linear_regression(
     _, var = belief.trajectory(Course(np.zeros(7), phases), np.arange(4))
     designs = [textbook_h(model, np.concatenate([[phase, 0.8], mean]))[:, 2:] for phase in phases]
     assert_close(var, np.array([np.diag(design @ cov @ design.T) for design in designs]), 1e-8)
+
+
+def test_who_stands_is_not_believed_the_more_for_standing_longer(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempo, "PHASE_JITTER", 0.0)
+    monkeypatch.setattr(tempo, "WAITING", 0.0)
+    standing = Tempo(stop_rate=1e9, go_rate=0.0, leap_rate=0.0)
+    model = dataclasses.replace(chance_model(rng, known_phase(0.8, start=0.4)), tempo=standing)
+    reading = Observation(np.arange(2), np.array([0.3, 0.9]), np.full(2, 0.01))
+    filter, named = make("rbpf", model, particles=20), Course(np.zeros(3), np.array([0.1, 0.4, 0.8]))
+    belief, _ = filter.step(filter.init(rng), reading, 0.0, rng)
+    mean, (_, var) = belief.weights_mean, belief.trajectory(named, np.arange(4))
+    assert np.abs(mean - model.prior.mean).max() > 0.01
+    for _ in range(20):
+        belief, info = filter.step(belief, reading, 0.05, rng)
+        assert info.log_likelihood != 0  # it is still asked who foresaw it
+    assert belief.motion.waiting.all()
+    assert_close(belief.weights_mean, mean, 1e-9)
+    assert_close(belief.trajectory(named, np.arange(4))[1], var, 1e-9)
+
+
+def test_leaps_are_as_many_and_as_far_as_is_said(rng: np.random.Generator) -> None:
+    phase, kinds = known_phase(0.5, start=0.1), Tempo(stop_rate=1e9, go_rate=0.0, leap_rate=3.0, leap=0.1)
+    begun, _ = tempo.begin(phase, kinds, 20_000, rng)
+    leapt = tempo.advance(begun, phase, kinds, 0.2, rng).phase - begun.phase  # of a tenth of an interaction: 0.3 each
+    assert leapt.mean() == pytest.approx(0.3 * 0.1 / 2, rel=0.08)
+    assert leapt.std() == pytest.approx(np.sqrt(0.3 * 0.1**2 / 3), rel=0.08)
 
 
 @pytest.mark.parametrize(

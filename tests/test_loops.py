@@ -15,7 +15,7 @@ from loops import LOOPS
 
 import inphase
 from inphase.basis import Gaussian
-from inphase.filters import FILTERS, make, rbpf
+from inphase.filters import FILTERS, make
 from inphase.observation import NOTHING, Observation
 
 STEPS = 15
@@ -74,12 +74,6 @@ def test_a_filter_is_its_loop(learned: inphase.Model, name: str, seed: int) -> N
 def test_with_several_bases_too(name: str, seed: int) -> None:
     model = chance_model(np.random.default_rng(seed), phase_model(), white=False)
     assert_equal_all_along(model, name, seed)
-
-
-@pytest.mark.parametrize("at_once", [1, 2])
-def test_readings_may_be_taken_in_by_any_number_at_once(at_once: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rbpf, "AT_ONCE", at_once)  # fewer than a sample has
-    assert_equal_all_along(chance_model(np.random.default_rng(0), phase_model(), white=False), "rbpf", 0)
 
 
 @pytest.mark.parametrize("name", ["bip", "ebip", "particle"])

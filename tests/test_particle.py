@@ -242,7 +242,9 @@ def test_rbpf_comes_as_close_to_the_same_answer(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(tempo, "PHASE_JITTER", 0.0)
     monkeypatch.setattr(rbpf, "VARIANCE_KEPT", 1.0)
     model, steps = watched(np.random.default_rng(1))
-    unknown = Tempo(usual=1.0, usual_std=0.125, change_rate=0.0, steady=1.0, momentary_std=0.0, stop_rate=0.0)
+    unknown = Tempo(
+        usual=1.0, usual_std=0.125, change_rate=0.0, steady=1.0, momentary_std=0.0, stop_rate=0.0, leap_rate=0.0
+    )
     model = dataclasses.replace(model, tempo=unknown)
     exact = on_a_grid(model, steps, VELOCITY[0] * np.exp(0.125 * FINE), "gaussian")
     few, many = (off_by(model, steps, exact, "rbpf", particles=count) for count in (100, 1600))

@@ -57,17 +57,18 @@ class RbpfLoop:
         return [replace(particles[i], log_weight=0.0) for i in systematic(weights, rng)]
 
     def _moved(self, particles: list[PhaseParticle], dt: float, rng: np.random.Generator) -> list[PhaseParticle]:
-        """The particles dt [s] later: each may take on another tempo, for good or for a stretch, stop or go."""
+        """The particles dt [s] later: each may take on another tempo, for good or for a stretch, stop, go or leap."""
         count, kinds = len(particles), self.model.tempo
         typical = self.model.phase.nominal_velocity * dt
-        change, stretch, stop, go = (
+        change, stretch, stop, go, leap = (
             rng.random(count) < 1 - np.exp(-rate * typical)
-            for rate in (kinds.change_rate, kinds.stretch_rate, kinds.stop_rate, kinds.go_rate)
+            for rate in (kinds.change_rate, kinds.stretch_rate, kinds.stop_rate, kinds.go_rate, kinds.leap_rate)
         )
         # The order of the draws: a share of its own for each, then which kind of tempo it is.
         own_share, own_kind = (rng.permutation(count) + rng.random(count)) / count, rng.random(count)
         new_share, new_kind = (rng.permutation(count) + rng.random(count)) / count, rng.random(count)
         jitter = tempo.PHASE_JITTER * np.sqrt(typical) * rng.standard_normal(count)
+        leapt = np.where(leap, kinds.leap * rng.random(count), 0.0)
         found = []
         for i, one in enumerate(particles):
             own, momentary = one.own, one.momentary
@@ -78,7 +79,7 @@ class RbpfLoop:
                     new_share[i]
                 )
             one = replace(one, own=own, momentary=momentary, waiting=not go[i] if one.waiting else bool(stop[i]))
-            found.append(replace(one, phase=within(one.phase + self._tempo(one) * dt + jitter[i])))
+            found.append(replace(one, phase=within(one.phase + self._tempo(one) * dt + jitter[i] + leapt[i])))
         return found
 
     def _updated(self, one: PhaseParticle, seen: Observation) -> PhaseParticle:
@@ -97,8 +98,8 @@ class RbpfLoop:
         return replace(
             one,
             log_weight=one.log_weight + float(log_density),
-            mean=one.mean + gain @ innovation,
-            cov=one.cov - gain @ jacobian @ one.cov,
+            mean=one.mean if one.waiting else one.mean + gain @ innovation,
+            cov=one.cov if one.waiting else one.cov - gain @ jacobian @ one.cov,
         )
 
     def _tempo(self, one: PhaseParticle) -> float:

@@ -41,6 +41,16 @@ def forward(roots: Float[np.ndarray, "P M M"], columns: Float[np.ndarray, "P M K
     return solved
 
 
+def backward(roots: Float[np.ndarray, "P M M"], columns: Float[np.ndarray, "P M"]) -> Float[np.ndarray, "P M"]:
+    """(P, M) root⁻ᵀ @ column for many lower triangular roots at once."""
+    rest = columns.copy()
+    scale = 1 / np.diagonal(roots, axis1=1, axis2=2)
+    for i in reversed(range(rest.shape[1])):
+        rest[:, i] *= scale[:, i]
+        rest[:, :i] -= roots[:, i, :i] * rest[:, i : i + 1]
+    return rest
+
+
 def innovation_score(innovation: Float[np.ndarray, " M"], cov: Float[np.ndarray, "M M"]) -> InnovationScore | None:
     """The Gaussian log-density of an innovation under its covariance S (Eq. 2.7).
 

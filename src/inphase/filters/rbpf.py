@@ -7,7 +7,7 @@ uncertain while the movement is curved, is not linearised at all.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,18 +17,18 @@ from inphase.arrays import freeze, frozen
 from inphase.errors import OptionError
 from inphase.filters.belief import Course, factor_of, mixed
 from inphase.filters.filter import StepInfo
-from inphase.filters.gaussian import ABSURD, forward
+from inphase.filters.gaussian import ABSURD, backward, forward
 from inphase.filters.resampling import effective_size, systematic
 from inphase.filters.tempo import Motion, advance, begin
 from inphase.model import Model
 from inphase.observation import Observation
 
-VARIANCE_KEPT = 0.999  # by the directions that are filtered; the rest is added to the noise
-MOST_DIRECTIONS = 24  # for the time a step takes
+VARIANCE_KEPT = 0.99  # by the directions that are filtered; the rest is added to the noise
+MOST_DIRECTIONS = 64  # for the time a step takes
 RESAMPLE_BELOW = 0.5  # of the particles, their effective number
 PHASES = 100  # at which the rest of the variance is tabulated
-AT_ONCE = 8  # readings that are taken in together
 LOOKED_AT = 2000  # phases in a response, particles times samples; fewer particles speak for all when there are more
+LOOKED_INTO = 60  # for the variance within particles, which have much in common
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,18 +56,19 @@ class Directions:
 class ParticleBelief:
     """Particles of phase and tempo, each with a Gaussian over the weights in the filter's directions.
 
-    log_weights: (P,). means: (P, R), covs: (P, R, R).
+    log_weights: (P,). information: (P, R + 1, R + 1) per particle what was learned of the weights, R of them, and what
+    was read, in the last row. roots: their lower triangular roots.
     """
 
     model: Model
     directions: Directions
     log_weights: Float[np.ndarray, " P"]
     motion: Motion
-    means: Float[np.ndarray, "P R"]
-    covs: Float[np.ndarray, "P R R"]
+    information: Float[np.ndarray, "P n n"]
+    roots: Float[np.ndarray, "P n n"]
 
     def __post_init__(self) -> None:
-        for array in (self.log_weights, self.means, self.covs):
+        for array in (self.log_weights, self.information, self.roots):
             array.setflags(write=False)
 
     @cached_property
@@ -90,6 +91,18 @@ class ParticleBelief:
         return frozen((off * self.weights[:, None]).T @ off)
 
     @cached_property
+    def means(self) -> Float[np.ndarray, "P R"]:
+        """(P, R) the means of the coordinates."""
+        return frozen(backward(self.roots[:, :-1, :-1], self.roots[:, -1, :-1]))
+
+    @property
+    def covs(self) -> Float[np.ndarray, "P R R"]:
+        """(P, R, R) their covariances."""
+        size = self.roots.shape[1] - 1
+        inverse = forward(self.roots[:, :-1, :-1], np.tile(np.eye(size), (len(self.roots), 1, 1)))
+        return np.asarray(inverse.transpose(0, 2, 1) @ inverse)
+
+    @cached_property
     def weights_mean(self) -> Float[np.ndarray, " B"]:
         return frozen(self.model.prior.mean + self.weights @ self.means @ self.directions.rows)
 
@@ -104,23 +117,38 @@ class ParticleBelief:
     def trajectory(
         self, course: Course, features: Int[np.ndarray, " M"]
     ) -> tuple[Float[np.ndarray, "S M"], Float[np.ndarray, "S M"]]:
-        most = max(LOOKED_AT // len(course.share), 20)
-        weights, standing, means, covs = self.weights, self.motion.phase, self.means, self.covs
-        if len(weights) > most:
-            order = np.argsort(standing)  # so that those who speak stand where all of them stand
-            speaking = order[systematic(weights[order], most, 0.5)]
-            weights, standing = np.full(most, 1 / most), standing[speaking]
-            means, covs = means[speaking], covs[speaking]
-        confined = self.model.phase.confine(standing[:, None] * course.share + course.offset)
-        phases = confined.reshape(-1)
+        samples = len(course.share)
+        # Sorted by phase, so that those who speak stand where all of them stand.
+        many, shares = self._speaking(max(LOOKED_AT // samples, 20), np.argsort(self.motion.phase))
+        phases, plain, rows = self._readings(many, course, features)
+        mean = plain + (self.means[many][:, None, None] @ rows)[:, :, 0]
+        mean, between = mixed(shares, mean, np.zeros_like(mean))
+        few, shares = self._speaking(max(LOOKED_INTO // samples, 10), np.arange(len(self.weights)))
+        phases, _, rows = self._readings(few, course, features)
+        across = rows.transpose(0, 2, 1, 3).reshape(len(few), rows.shape[2], -1)
+        white = forward(self.roots[few, :-1, :-1], across)
+        within = (white**2).sum(1).reshape(*phases.shape, -1)
+        within += self.directions.rest_at(phases.reshape(-1), features).reshape(within.shape)
+        return mean, between + np.tensordot(shares, within, 1)
+
+    def _speaking(
+        self, count: int, order: Int[np.ndarray, " P"]
+    ) -> tuple[Int[np.ndarray, " Q"], Float[np.ndarray, " Q"]]:
+        """At most so many particles that speak for all, evenly chosen in some order, and their shares."""
+        if len(self.weights) <= count:
+            return np.arange(len(self.weights)), self.weights
+        return order[systematic(self.weights[order], count, 0.5)], np.full(count, 1 / count)
+
+    def _readings(
+        self, particles: Int[np.ndarray, " Q"], course: Course, features: Int[np.ndarray, " M"]
+    ) -> tuple[Float[np.ndarray, "Q S"], Float[np.ndarray, "Q S M"], Float[np.ndarray, "Q S R M"]]:
+        """Phases of some particles along a course, what the mean movement reads there, and Hᵀ."""
+        phases = self.motion.phase[particles, None] * course.share + course.offset
+        phases = self.model.phase.confine(phases)
         plain, rows = self.model.layout.predict_and_project(
-            phases, self.model.prior.mean, self.directions.rows, features
+            phases.reshape(-1), self.model.prior.mean, self.directions.rows, features
         )
-        plain, rows = plain.reshape(*confined.shape, -1), rows.reshape(*confined.shape, -1, len(features))
-        mean = plain + (means[:, None, None] @ rows)[:, :, 0]
-        var = np.einsum("psrm,psrm->psm", rows, covs[:, None] @ rows)
-        var += self.directions.rest_at(phases, features).reshape(var.shape)
-        return mixed(weights, mean, var)
+        return phases, plain.reshape(*phases.shape, -1), rows.reshape(*phases.shape, -1, len(features))
 
 
 @dataclass(frozen=True)
@@ -156,28 +184,21 @@ class Rbpf:
 
     def init(self, rng: np.random.Generator) -> ParticleBelief:
         """The prior: every particle knows as little of the weights as the others."""
-        size = len(self.directions.rows)
         motion, log_weights = begin(self.model.phase, self.model.tempo, self.particles, rng)
-        return ParticleBelief(
-            self.model,
-            self.directions,
-            log_weights,
-            motion,
-            np.zeros((self.particles, size)),
-            np.tile(np.eye(size), (self.particles, 1, 1)),
-        )
+        nothing = np.tile(np.eye(len(self.directions.rows) + 1), (self.particles, 1, 1))
+        return ParticleBelief(self.model, self.directions, log_weights, motion, nothing, nothing)
 
     def predict(self, belief: ParticleBelief, dt: float, rng: np.random.Generator) -> ParticleBelief:
         """The particles move on; nothing else does."""
         if dt == 0:
             return belief
         motion = advance(belief.motion, self.model.phase, self.model.tempo, dt, rng)
-        return ParticleBelief(self.model, belief.directions, belief.log_weights, motion, belief.means, belief.covs)
+        return replace(belief, motion=motion)
 
     def step(
         self, belief: ParticleBelief, observation: Observation, dt: float, rng: np.random.Generator
     ) -> tuple[ParticleBelief, StepInfo]:
-        """A Kalman update of every particle's weights (Eq. 2.7 to 2.10); particles count by how well they foresaw."""
+        """Every particle learns of its weights (Eq. 2.7 to 2.10), and counts by how well it foresaw the sample."""
         belief = self.predict(belief, dt, rng)
         if len(observation) == 0:
             return belief, StepInfo()
@@ -188,56 +209,57 @@ class Rbpf:
         repeats = observation.noise_var / self.model.noise.var[features]
         noise_var = observation.noise_var + belief.directions.rest_at(phases, features) * repeats
         with np.errstate(over="ignore", invalid="ignore"):  # an absurd reading is found out at the end
-            conditioned = _conditioned(belief, rows, observation.values - plain, noise_var)
-        if conditioned is None:
+            learned = _learned(belief, rows, observation.values - plain, noise_var)
+        if learned is None:
             return belief, StepInfo(healthy=False)
-        means, covs, log_likelihood, surprise = conditioned
+        information, roots, log_likelihood, surprise = learned
+        # A misfit is one of the phase, not of the moment: who stands reads the same again, and learns nothing of it.
+        waiting = belief.motion.waiting
+        information[waiting], roots[waiting] = belief.information[waiting], belief.roots[waiting]
         log_weights = np.log(np.maximum(belief.weights, 1e-300)) + log_likelihood
         highest = log_weights.max()
-        updated = ParticleBelief(self.model, belief.directions, log_weights - highest, belief.motion, means, covs)
+        updated = replace(belief, log_weights=log_weights - highest, information=information, roots=roots)
         # Particles that were somewhere else are surprised without need: it counts for as much as they still do.
         info = StepInfo(float(highest + np.log(np.exp(log_weights - highest).sum())), float(updated.weights @ surprise))
         return _resampled(updated, rng), info
 
 
-def _conditioned(
+def _learned(
     belief: ParticleBelief,
     rows: Float[np.ndarray, "P R M"],
     readings: Float[np.ndarray, "P M"],
     noise_var: Float[np.ndarray, "P M"],
 ) -> (
-    tuple[Float[np.ndarray, "P R"], Float[np.ndarray, "P R R"], Float[np.ndarray, " P"], Float[np.ndarray, " P"]] | None
+    tuple[Float[np.ndarray, "P n n"], Float[np.ndarray, "P n n"], Float[np.ndarray, " P"], Float[np.ndarray, " P"]]
+    | None
 ):
-    """Means, covariances, log-likelihood and squared surprise of every particle after a sample; None for an absurd one.
+    """Information, roots, log-likelihood and squared surprise of every particle after a sample; None for an absurd one.
 
-    readings: less those of the mean movement. A few at a time, one lot after the other: their noise is independent,
-    and several small systems are less work than a large one.
+    readings: less those of the mean movement. Kalman's update in the form that adds up, [Hᵀ; y] R⁻¹ [H y]: its cost
+    hardly hangs on how many readings there are. The corner of the root is what the readings are off, given all that
+    was learned, so one factorisation says all; what it says is taken off, and what was read long ago is not carried on.
     """
-    means, covs = belief.means, belief.covs
-    count, readable = len(means), readings.shape[1]
-    log_likelihood, surprise = np.full(count, -0.5 * readable * np.log(2 * np.pi)), np.zeros(count)
-    for first in range(0, readable, AT_ONCE):
-        lot = slice(first, first + AT_ONCE)
-        across = rows[:, :, lot].transpose(0, 2, 1)  # H
-        innovation = readings[:, lot] - (across @ means[:, :, None])[:, :, 0]
-        cross = across @ covs  # H Σ
-        innovation_cov = cross @ rows[:, :, lot]  # S, Eq. 2.7
-        diagonal = np.arange(innovation.shape[1])
-        innovation_cov[:, diagonal, diagonal] += noise_var[:, lot]
-        try:
-            root = np.linalg.cholesky(innovation_cov)
-        except np.linalg.LinAlgError:
-            return None
-        white = forward(root, np.concatenate([innovation[:, :, None], cross], axis=2))
-        gain = white[:, :, 1:].transpose(0, 2, 1)
-        means = means + (gain @ white[:, :, :1])[:, :, 0]  # Eq. 2.9
-        covs = covs - gain @ white[:, :, 1:]  # Eq. 2.10, symmetric by construction
-        surprise += (white[:, :, 0] ** 2).sum(1)
-        log_likelihood -= np.log(root[:, diagonal, diagonal]).sum(1)
-    log_likelihood -= 0.5 * surprise
+    readable = readings.shape[1]
+    scaled = np.concatenate([rows, readings[:, None]], axis=1)
+    scaled /= np.sqrt(noise_var)[:, None]
+    information = belief.information + scaled @ scaled.transpose(0, 2, 1)
+    try:
+        roots = np.linalg.cholesky(information)
+    except np.linalg.LinAlgError:
+        return None
+    surprise = np.maximum(roots[:, -1, -1] ** 2 - 1, 0.0)
+    information[:, -1, -1] -= surprise
+    roots[:, -1, -1] = 1.0
+    log_det = 2 * (_log_det(roots) - _log_det(belief.roots)) + np.log(2 * np.pi * noise_var).sum(1)  # of S, Eq. 2.7
+    log_likelihood = -0.5 * (surprise + log_det)
     if not np.isfinite(log_likelihood).all() or surprise.min() > ABSURD**2 * readable:
         return None
-    return means, covs, log_likelihood, surprise
+    return information, roots, log_likelihood, surprise
+
+
+def _log_det(roots: Float[np.ndarray, "P n n"]) -> Float[np.ndarray, " P"]:
+    """(P,) the logarithms of the determinants of roots."""
+    return np.asarray(np.log(np.diagonal(roots, axis1=1, axis2=2)).sum(1))
 
 
 def _resampled(belief: ParticleBelief, rng: np.random.Generator) -> ParticleBelief:
@@ -246,11 +268,10 @@ def _resampled(belief: ParticleBelief, rng: np.random.Generator) -> ParticleBeli
     if effective_size(belief.weights) >= RESAMPLE_BELOW * count:
         return belief
     kept = systematic(belief.weights, count, float(rng.random()))
-    return ParticleBelief(
-        belief.model,
-        belief.directions,
-        np.zeros(count),
-        belief.motion.pick(kept),
-        belief.means[kept],
-        belief.covs[kept],
+    return replace(
+        belief,
+        log_weights=np.zeros(count),
+        motion=belief.motion.pick(kept),
+        information=belief.information[kept],
+        roots=belief.roots[kept],
     )

@@ -1,4 +1,4 @@
-"""How particles move on: a tempo that is positive, mostly usual, and may pause (DESIGN 4, trap 7)."""
+"""How particles move on: a tempo that is positive, mostly usual, and may pause, and leaps (DESIGN 4, trap 7)."""
 
 from __future__ import annotations
 
@@ -85,14 +85,15 @@ def advance(motion: Motion, phase: PhaseModel, tempo: Tempo, dt: float, rng: np.
 
 def _step(motion: Motion, phase: PhaseModel, tempo: Tempo, dt: float, rng: np.random.Generator) -> Motion:
     count, typical = len(motion.phase), phase.nominal_velocity * dt
-    rates = np.array([tempo.change_rate, tempo.stretch_rate, tempo.stop_rate, tempo.go_rate])
-    changes, begins, stops, goes = rng.random((4, count)) < -np.expm1(-rates * typical)[:, None]
+    rates = np.array([tempo.change_rate, tempo.stretch_rate, tempo.stop_rate, tempo.go_rate, tempo.leap_rate])
+    changes, begins, stops, goes, leaps = rng.random((5, count)) < -np.expm1(-rates * typical)[:, None]
     own = np.where(changes, _mixed(count, tempo.usual, tempo.usual_std, tempo.other_std, rng), motion.own)
     momentary = _mixed(count, tempo.steady, tempo.momentary_std, tempo.other_std, rng)
     momentary = np.where(begins, momentary, motion.momentary)
     waiting = np.where(motion.waiting, ~goes, stops)
     jitter = PHASE_JITTER * np.sqrt(typical) * rng.standard_normal(count)
-    moved = phase.confine(motion.phase + _tempos(own, momentary, waiting, phase) * dt + jitter)
+    leap = np.where(leaps, tempo.leap * rng.random(count), 0.0)
+    moved = phase.confine(motion.phase + _tempos(own, momentary, waiting, phase) * dt + jitter + leap)
     return Motion(moved, own, momentary, waiting)
 
 

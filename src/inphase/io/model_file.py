@@ -22,7 +22,7 @@ from inphase.io.model_header import arrays_of, build, describe, renewed, split
 from inphase.model import Model
 
 MAGIC = b"INPHASE\n"
-FORMAT = 3  # 1 had no tempo, reflex, band and evidence; 2 no windows
+FORMAT = 4  # 1 had no tempo, reflex, band and evidence; 2 no windows; 3 no leaps
 PREFIX = struct.Struct("<8sIIQ32s")
 LARGEST_HEADER = 16 * 2**20  # bytes
 LARGEST_PAYLOAD = 2 * 2**30  # bytes
