@@ -117,38 +117,32 @@ class ParticleBelief:
     def trajectory(
         self, course: Course, features: Int[np.ndarray, " M"]
     ) -> tuple[Float[np.ndarray, "S M"], Float[np.ndarray, "S M"]]:
-        samples = len(course.share)
+        samples, model, everyone = len(course.share), self.model, np.arange(len(self.weights))
         # Sorted by phase, so that those who speak stand where all of them stand.
-        many, shares = self._speaking(max(LOOKED_AT // samples, 20), np.argsort(self.motion.phase))
-        phases, plain, rows = self._readings(many, course, features)
+        most = LOOKED_AT // samples
+        order = everyone if len(everyone) <= most else np.argsort(self.motion.phase)
+        many, shares = _speaking(self.weights, order, max(most, 20))
+        phases = model.phase.confine(self.motion.phase[many, None] * course.share + course.offset)
+        plain, rows = model.layout.predict_and_project(
+            phases.reshape(-1), model.prior.mean, self.directions.rows, features
+        )
+        plain, rows = plain.reshape(*phases.shape, -1), rows.reshape(*phases.shape, -1, len(features))
         mean = plain + (self.means[many][:, None, None] @ rows)[:, :, 0]
         mean, between = mixed(shares, mean, np.zeros_like(mean))
-        few, shares = self._speaking(max(LOOKED_INTO // samples, 10), np.arange(len(self.weights)))
-        phases, _, rows = self._readings(few, course, features)
-        across = rows.transpose(0, 2, 1, 3).reshape(len(few), rows.shape[2], -1)
-        white = forward(self.roots[few, :-1, :-1], across)
-        within = (white**2).sum(1).reshape(*phases.shape, -1)
-        within += self.directions.rest_at(phases.reshape(-1), features).reshape(within.shape)
-        return mean, between + np.tensordot(shares, within, 1)
+        few, shares = _speaking(shares, np.arange(len(many)), max(LOOKED_INTO // samples, 10))
+        across = rows[few].transpose(0, 2, 1, 3).reshape(len(few), rows.shape[2], -1)
+        white = forward(self.roots[many[few], :-1, :-1], across)
+        within = (white**2).sum(1) + self.directions.rest_at(phases[few].reshape(-1), features).reshape(len(few), -1)
+        return mean, between + (shares @ within).reshape(mean.shape)
 
-    def _speaking(
-        self, count: int, order: Int[np.ndarray, " P"]
-    ) -> tuple[Int[np.ndarray, " Q"], Float[np.ndarray, " Q"]]:
-        """At most so many particles that speak for all, evenly chosen in some order, and their shares."""
-        if len(self.weights) <= count:
-            return np.arange(len(self.weights)), self.weights
-        return order[systematic(self.weights[order], count, 0.5)], np.full(count, 1 / count)
 
-    def _readings(
-        self, particles: Int[np.ndarray, " Q"], course: Course, features: Int[np.ndarray, " M"]
-    ) -> tuple[Float[np.ndarray, "Q S"], Float[np.ndarray, "Q S M"], Float[np.ndarray, "Q S R M"]]:
-        """Phases of some particles along a course, what the mean movement reads there, and Hᵀ."""
-        phases = self.motion.phase[particles, None] * course.share + course.offset
-        phases = self.model.phase.confine(phases)
-        plain, rows = self.model.layout.predict_and_project(
-            phases.reshape(-1), self.model.prior.mean, self.directions.rows, features
-        )
-        return phases, plain.reshape(*phases.shape, -1), rows.reshape(*phases.shape, -1, len(features))
+def _speaking(
+    weights: Float[np.ndarray, " P"], order: Int[np.ndarray, " P"], count: int
+) -> tuple[Int[np.ndarray, " Q"], Float[np.ndarray, " Q"]]:
+    """At most so many particles that speak for all, evenly chosen in some order, and their shares."""
+    if len(weights) <= count:
+        return order, weights[order]
+    return order[systematic(weights[order], count, 0.5)], np.full(count, 1 / count)
 
 
 @dataclass(frozen=True)
