@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 import inphase
 from experiments.hugging.demonstrations import dataset
 from experiments.hugging.hug import OBSERVED
-from experiments.hugging.showing import TRUNK, partner_alone
+from experiments.hugging.showing import HANDS, partner_alone
 from experiments.hugging.world import JOINTS
 
 LOOKAHEAD = 0.05  # of the interaction: the operator was late, and joints are
@@ -49,7 +49,7 @@ class Learned:
     ) -> tuple[np.ndarray, np.ndarray]:
         """What the model says; `look` is the operator's, and not for it."""
         if row is not None:
-            seen = TRUNK.sample(dict(zip(OBSERVED, row.tolist(), strict=True)))
+            seen = HANDS.sample(dict(zip(OBSERVED, row.tolist(), strict=True)))
             estimate = self.session.observe(time, {name: seen[name] for name in self.session.model.observed})
             self.said = self.session.respond(lookahead=LOOKAHEAD, samples=1).mean[0]
             velocity = (estimate.phase_velocity, estimate.phase_velocity_std)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import inphase
 from experiments.hugging import camera
-from experiments.hugging.pads import BACK, CHEST, SENSORS
+from experiments.hugging.pads import BACK, SENSORS
 from inphase.basis import Basis, Gaussian
 
 UNIFORM = Gaussian(8)  # 664 - 392 weights of 61 - 27 channels in Table 4
@@ -53,15 +53,18 @@ def grouped_sparse(train: inphase.Dataset) -> Shown:
     return replace(shown, bases=usual | sparse, says=f"{min(sizes)} to {max(sizes)} functions a channel")
 
 
-TRUNK = inphase.Reduction({f"group_{group}": (SENSORS[group], "max") for group in CHEST | BACK})
+HANDS = inphase.Reduction({f"group_{group}": (SENSORS[group], "max") for group in BACK})
 
 
 def partner_alone(train: inphase.Dataset) -> Shown:
-    """Groups of chest and back alone, which the partner presses, and none of the arms, which press themselves."""
+    """Groups of the back alone, which the partner's hands press, and none that the robot's own arms press, too.
+
+    What the robot does itself would tell it to go on doing it: a robot that holds loosely feels a loose hug.
+    """
 
     def change(dataset: inphase.Dataset) -> inphase.Dataset:
-        trunk = [name for group in CHEST | BACK for name in SENSORS[group]]
-        return TRUNK.dataset(dataset.select([*camera.NAMES, *trunk]))
+        back = [name for group in BACK for name in SENSORS[group]]
+        return HANDS.dataset(dataset.select([*camera.NAMES, *back]))
 
     return Shown(change(train), None, change)
 
@@ -71,5 +74,5 @@ WAYS: dict[str, Callable[[inphase.Dataset], Shown]] = {
     "MIFS": selected,
     "Group": grouped,
     "Group + OLS": grouped_sparse,
-    "Trunk": partner_alone,
+    "Back": partner_alone,
 }

@@ -23,9 +23,11 @@ from inphase.filters.tempo import Motion, advance, begin
 from inphase.model import Model
 from inphase.observation import Observation
 
+FREE_DIRECTIONS = 24  # are filtered in any case: they take hardly more time than fewer would
 VARIANCE_KEPT = 0.99  # by the directions that are filtered; the rest is added to the noise
 MOST_DIRECTIONS = 64  # for the time a step takes
 RESAMPLE_BELOW = 0.5  # of the particles, their effective number
+ROUNDING = 1e-9  # directions so much smaller than the widest are none
 PHASES = 100  # at which the rest of the variance is tabulated
 LOOKED_AT = 2000  # phases in a response, particles times samples; fewer particles speak for all when there are more
 LOOKED_INTO = 60  # for the variance within particles, which have much in common
@@ -170,7 +172,8 @@ class Rbpf:
         flat = curves.transpose(1, 0, 2).reshape(len(factor), -1)
         turn, size, _ = np.linalg.svd(flat, full_matrices=False)
         share = np.cumsum(size**2) / max(float(np.sum(size**2)), np.finfo(float).tiny)
-        kept = min(int(np.searchsorted(share, VARIANCE_KEPT)) + 1, MOST_DIRECTIONS, len(factor))
+        enough = max(int(np.searchsorted(share, VARIANCE_KEPT)) + 1, FREE_DIRECTIONS)
+        kept = min(enough, MOST_DIRECTIONS, int(np.count_nonzero(size > ROUNDING * size[0])))
         turn = turn[:, :kept]
         rows = turn.T @ factor
         rest = (curves**2).sum(1) - (layout.project_each(grid, rows) ** 2).sum(1)
