@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -106,6 +106,29 @@ def test_a_partner_may_be_half_or_twice_as_fast(tempo: float, seed: int, model: 
     assert np.abs(played.phase - phases).max() < 0.1
     assert played.tempo[len(phases) // 2] == pytest.approx(tempo, rel=0.2)
     assert against_the_clock(model, played, truth) < 0.15
+
+
+def test_a_rest_that_is_cut_short_is_leapt_over() -> None:
+    """The demonstrated movement rests from 0.45 to 0.65, where nothing tells the phase; a partner goes on at once."""
+
+    def resting(phases: np.ndarray) -> np.ndarray:
+        return np.interp(phases, [0.0, 0.45, 0.65, 1.0], [0.0, 0.5, 0.5, 1.0])
+
+    rng, moments = np.random.default_rng(7), np.linspace(0, 1, COUNT + 1)
+    values = [curves(resting(moments), rng.standard_normal(2)) for _ in range(16)]
+    values = [v + NOISE_STD * rng.standard_normal(v.shape) for v in values]
+    data = inphase.Dataset.from_arrays([np.arange(COUNT + 1) / RATE] * 16, values, ["a", "b"], ["c", "d"])
+    model = inphase.fit(data, calibrate=False)
+    without = replace(model, tempo=replace(model.tempo, leap_rate=0.0))
+    phases = np.concatenate([moments[moments < 0.46], moments[moments > 0.64]])
+    off = []
+    for seed in range(4):
+        samples, _ = partner(resting(phases), seed)
+        played = [np.abs(play(one, samples, seed).phase - phases) for one in (model, without)]
+        off.append([one[(phases > 0.75) & (phases < 0.95)].mean() for one in played])
+    leapt, lost = np.mean(off, axis=0)
+    assert leapt < 0.08
+    assert leapt < lost / 2
 
 
 # --------------------------------------------------------------------------------------------------------- readings
