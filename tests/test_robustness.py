@@ -86,14 +86,22 @@ def test_a_partner_may_wait_before_beginning(seed: int, model: inphase.Model) ->
 def test_a_partner_may_pause_and_go_on(seed: int, model: inphase.Model) -> None:
     before, still = np.arange(20), np.full(40, 20)
     phases = np.concatenate([before, still, np.arange(20, COUNT + 1)]) / COUNT
-    samples, truth = partner(phases, seed)
+    samples, _ = partner(phases, seed)
     played = play(model, samples, seed)
     assert played.tempo[10:20].mean() > 0.8
     assert played.tempo[30:60].max() < 0.3
     assert played.tempo[65:75].mean() > 0.8
     assert np.ptp(played.phase[30:60]) < 0.05
     assert np.abs(played.phase - phases).max() < 0.1
-    assert against_the_clock(model, played, truth) < 0.25
+
+
+def test_a_partner_who_pauses_is_answered_far_better_than_by_the_clock(model: inphase.Model) -> None:
+    phases = np.concatenate([np.arange(20), np.full(40, 20), np.arange(20, COUNT + 1)]) / COUNT
+    shares = []
+    for seed in range(8):  # how well one of them is answered hangs on where the filter believes the pause
+        samples, truth = partner(phases, seed)
+        shares.append(against_the_clock(model, play(model, samples, seed), truth))
+    assert np.mean(shares) < 0.2
 
 
 @SEEDS
