@@ -184,6 +184,35 @@ def test_a_study_takes_its_place_in_a_page_and_leaves_the_rest(tmp_path):
         page.into(target)
 
 
+def test_parts_of_a_study_take_their_places_and_leave_the_others(tmp_path):
+    heads = ["First", "Second (Fig. 2)", "Third"]
+
+    def made(*parts, said):
+        page = Page("mine", tmp_path / "results", heads)
+        page.say("of the study")
+        for part in parts:
+            page.head(part, "command", 1.0)
+            page.say(f"{said} {part}\n\nmore")
+        return page
+
+    (target := tmp_path / "studies.md").write_text("x\n<!-- begin mine -->\nnot run\n<!-- end mine -->\ny\n")
+    made("Third", "First", said="old").into(target)
+    made("Second (Fig. 2)", "First", said="new").into(target)
+    text = target.read_text()
+    assert [line for line in text.splitlines() if line.startswith(("new", "old"))] == [
+        "new First",
+        "new Second (Fig. 2)",
+        "old Third",
+    ]
+    assert text.count("of the study") == 1
+    assert "not run" not in text
+    made(*heads, said="whole").into(target)
+    whole = target.read_text()
+    made(*heads, said="whole").into(target)
+    assert whole == target.read_text()
+    assert "old" not in whole + text.split("old Third")[0]
+
+
 def test_time_warping_finds_where_each_sample_is(rng):
     """Against the plain double loop over all paths' costs, and a pace that is known."""
     reference = np.cumsum(rng.normal(size=(30, 2)), axis=0)
@@ -209,7 +238,7 @@ def test_bad_input_is_one_line(run, tmp_path):
     assert "handwriting" in error
     for more, told in (
         (["--part", "nothing", "-o", tmp_path / "o"], "unknown part 'nothing'; valid: models, temporal"),
-        (["--quick", "--page", tmp_path / "p.md"], "expected the whole study, got --part or --quick"),
+        (["--quick", "--page", tmp_path / "p.md"], "expected the whole study or parts of it, got --quick"),
         (["--jobs", "0"], "--jobs: expected at least 1, got 0"),
     ):
         code, _, error = run("experiment", "handwriting", *more)

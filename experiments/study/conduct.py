@@ -52,7 +52,7 @@ def conduct(
     """
     chosen = study.chosen(parts)
     source = digest([BESIDE / name, Path(inphase.__file__).parent], settings.quick, settings.seed)
-    page = Page(name, settings.folder)
+    page = Page(name, settings.folder, [part.what for part in study.parts.values()])
     page.say(study.says)
     for i, (part, told) in enumerate(chosen.items()):
 

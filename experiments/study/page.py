@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,10 +19,13 @@ if TYPE_CHECKING:
 
 
 class Page:
-    """Collects what a study tells. Pictures are written at once, beside the text; `write` writes that."""
+    """Collects what a study tells. Pictures are written at once, beside the text; `write` writes that.
 
-    def __init__(self, name: str, folder: Path) -> None:
-        self.name, self.folder = name, folder
+    heads: of all parts that the study has, in their order.
+    """
+
+    def __init__(self, name: str, folder: Path, heads: Sequence[str] = ()) -> None:
+        self.name, self.folder, self.heads = name, folder, heads
         self.blocks: list[str] = []
         self.pictures: list[str] = []
         folder.mkdir(parents=True, exist_ok=True)
@@ -75,7 +79,7 @@ class Page:
     def into(self, page: Path) -> None:
         """Take the place of this study's section in a larger page, and put the pictures into its folder `studies`.
 
-        Raises DataError where it has no such place.
+        Parts that are not told here stay as they are there. Raises DataError where it has no such place.
         """
         begin, end = (f"<!-- {word} {self.name} -->" for word in ("begin", "end"))
         if not page.is_file():
@@ -83,10 +87,18 @@ class Page:
         text = page.read_text(encoding="utf-8")
         if not 0 <= text.find(begin) < text.find(end):
             raise DataError(f"{page}: expected the lines {begin!r} and {end!r}, got none")
-        before, after = text.split(begin)[0], text.split(end)[1]
+        (before, rest), after = text.split(begin), text.split(end)[1]
+        told = _by_head(rest.split(end)[0]) | _by_head(self.text())
+        section = "\n\n".join(told[head] for head in ("", *self.heads) if head in told)
         folder = page.parent / "studies"
         folder.mkdir(exist_ok=True)
         for name in self.pictures:
             shutil.copyfile(self.folder / name, folder / name)
         with whole_file(page) as temporary:
-            temporary.write_text(f"{before}{begin}\n{self.text()}\n{end}{after}", encoding="utf-8")
+            temporary.write_text(f"{before}{begin}\n{section}\n{end}{after}", encoding="utf-8")
+
+
+def _by_head(text: str) -> dict[str, str]:
+    """The parts of a section with their headings, by these; what stands before the first one by ""."""
+    first, *others = re.split(r"^(?=### )", text, flags=re.MULTILINE)
+    return {"": first.strip()} | {part.splitlines()[0].removeprefix("### "): part.strip() for part in others}

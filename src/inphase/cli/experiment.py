@@ -46,14 +46,14 @@ def experiment(
         output: the folder for results, pictures and the page; otherwise inphase-studies/NAME or NAME-quick
         again: do all of it anew
         keep: take results that are there also where the code has changed since
-        page: put all of it into this page of Markdown, where the study has its place
+        page: put what is told into this page of Markdown, where the study has its place; other parts stay
     """
     root = _root()
     studies = sorted(path.parent.name for path in (root / "experiments").glob("*/study.py"))
     if name not in studies:
         raise OptionError(f"unknown study {name!r}; valid: {listing(studies)}")
-    if page is not None and (part or quick):
-        raise OptionError("--page: expected the whole study, got --part or --quick")
+    if page is not None and quick:
+        raise OptionError("--page: expected the whole study or parts of it, got --quick")
     jobs.check()
     check_matplotlib()
     sys.path.insert(0, str(root))  # processes that work find the studies as this one does

@@ -51,7 +51,7 @@ def fit(
         noise_bias: standard deviations added to the noise of channels, in their unit, such as head_x=0.05
         order: of the phase: 0 alone, 1 with tempo, 2 with a tempo that accelerates
         periodic: an episode is one cycle of an interaction that goes on and on
-        quick: hold nothing out: a second instead of up to a minute, but a model that nobody tested
+        quick: hold nothing out: a second instead of a minute or more, but a model that nobody tested
         report: print all that was tried, and how well each followed the held-out recordings
         json_: print the model's card, and the report, as JSON
     """

@@ -64,7 +64,7 @@ def fit(
     channel name or pattern, outside of which a channel is not used for inference (`inphase.learn_active` finds them).
     noise_bias: standard deviations by channel name or pattern, in the channel's unit (quaternions: [rad]), that are
     added to the noise of what is read (4.2.4). Where there are four demonstrations or more, the rest is calibrated:
-    demonstrations are held out and played, which takes up to a minute; `calibrate=False` leaves that out. jobs: the
+    demonstrations are held out and played, which takes up to some minutes; `calibrate=False` leaves that out. jobs: the
     processes that play. cluster: the address of a dask scheduler (tcp://host:port) whose workers play instead.
     progress: is told the share that is done.
     Raises DataError for fewer than two demonstrations, no controlled channel, or a channel that never moves;
