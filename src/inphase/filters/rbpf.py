@@ -128,11 +128,11 @@ class ParticleBelief:
         plain, rows = model.layout.predict_and_project(
             phases.reshape(-1), model.prior.mean, self.directions.rows, features
         )
-        plain, rows = plain.reshape(*phases.shape, -1), rows.reshape(*phases.shape, -1, len(features))
+        plain, rows = (part.reshape(*phases.shape, *part.shape[1:]) for part in (plain, rows))
         mean = plain + (self.means[many][:, None, None] @ rows)[:, :, 0]
         mean, between = mixed(shares, mean, np.zeros_like(mean))
         few, shares = _speaking(shares, np.arange(len(many)), max(LOOKED_INTO // samples, 10))
-        across = rows[few].transpose(0, 2, 1, 3).reshape(len(few), rows.shape[2], -1)
+        across = rows[few].transpose(0, 2, 1, 3).reshape(len(few), rows.shape[2], plain[0].size)
         white = forward(self.roots[many[few], :-1, :-1], across)
         within = (white**2).sum(1) + self.directions.rest_at(phases[few].reshape(-1), features).reshape(len(few), -1)
         return mean, between + (shares @ within).reshape(mean.shape)
