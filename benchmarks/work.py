@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from chance import Extent
 
-DIRECTIONS = 64  # that rbpf follows, at most
+DIRECTIONS = 63  # that rbpf follows, at most
 
 
 def ebip(extent: Extent) -> float:

@@ -25,7 +25,7 @@ from inphase.observation import Observation
 
 FREE_DIRECTIONS = 24  # are filtered in any case: they take hardly more time than fewer would
 VARIANCE_KEPT = 0.99  # by the directions that are filtered; the rest is added to the noise
-MOST_DIRECTIONS = 64  # for the time a step takes
+MOST_DIRECTIONS = 63  # for the time a step takes: with the readings 64 rows, which LAPACK likes
 RESAMPLE_BELOW = 0.5  # of the particles, their effective number
 ROUNDING = 1e-9  # directions so much smaller than the widest are none
 PHASES = 100  # at which the rest of the variance is tabulated
@@ -239,7 +239,8 @@ def _learned(
     readable = readings.shape[1]
     scaled = np.concatenate([rows, readings[:, None]], axis=1)
     scaled /= np.sqrt(noise_var)[:, None]
-    information = belief.information + scaled @ scaled.transpose(0, 2, 1)
+    information = scaled @ scaled.transpose(0, 2, 1)
+    information += belief.information
     try:
         roots = np.linalg.cholesky(information)
     except np.linalg.LinAlgError:
