@@ -87,8 +87,9 @@ class Page:
         text = page.read_text(encoding="utf-8")
         if not 0 <= text.find(begin) < text.find(end):
             raise DataError(f"{page}: expected the lines {begin!r} and {end!r}, got none")
-        (before, rest), after = text.split(begin), text.split(end)[1]
-        told = _by_head(rest.split(end)[0]) | _by_head(self.text())
+        before, there = text.split(begin, 1)
+        there, after = there.split(end, 1)
+        told = _by_head(there) | _by_head(self.text())
         section = "\n\n".join(told[head] for head in ("", *self.heads) if head in told)
         folder = page.parent / "studies"
         folder.mkdir(exist_ok=True)
