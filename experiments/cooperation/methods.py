@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 import inphase
-from experiments.cooperation.sensors import CONTROLLED, GROUPS
+from experiments.cooperation.sensors import CONTROLLED, GROUPS, OBSERVED
 from experiments.study.follower import AHEAD, MARKS, OURS, WRITTEN, Method, filtered, warped_in_time
 
 JOINTS = len(GROUPS["arm"])  # of the controlled channels
@@ -48,11 +48,10 @@ def followed(
     kept: np.ndarray,
     times: np.ndarray,
     seed: int,
-    columns: np.ndarray,
 ) -> np.ndarray:
     """(MARKS, 3) errors at even moments of a demonstration, of which these samples (T,) are seen at times (T,) [s].
 
-    Of the arm's joints in the rest of it [rad], of the gripper in it, and of the phase. columns: what is observed.
+    Of the arm's joints in the rest of it [rad], of the gripper in it, and of the phase.
     """
     of = METHODS[method]
     follower = of.make(models[of.model], seed)
@@ -61,7 +60,7 @@ def followed(
     marks = np.searchsorted(at, np.arange(1, MARKS + 1) / MARKS - 1e-9).clip(max=len(at) - 1)
     errors = np.zeros((MARKS, 3))
     for i, (time, row) in enumerate(zip(times, kept, strict=True)):
-        phase = follower.observe(time, demonstration.values[row, columns])
+        phase = follower.observe(time, demonstration.values[row, : len(OBSERVED)])
         here = marks == i
         if here.any():
             grid = np.linspace(at[i], 1.0, AHEAD)

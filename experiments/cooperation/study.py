@@ -38,14 +38,14 @@ def _trials(settings: Settings) -> int:
     return 1 if settings.quick else 40
 
 
-def _labels(settings: Settings, place: str, worn: str, fold: int | None) -> dict[str, str]:
+def _labels(settings: Settings, place: str, fold: int | None) -> dict[str, str]:
     """Of the models that do not know a demonstration, by their kind; of those that know all where none is named.
 
     Ours is calibrated, which takes minutes: it is made five times, each without five demonstrations.
     """
     group = fold if settings.quick or fold is None else fold // AT_ONCE
     which = {WRITTEN: fold, OURS: group}
-    return {kind: f"{kind}/{place}/{worn}/{'all' if i is None else i}" for kind, i in which.items()}
+    return {kind: f"{kind}/{place}/{'all' if i is None else i}" for kind, i in which.items()}
 
 
 # ------------------------------------------------------------------------------------------------------------- tasks
@@ -64,22 +64,17 @@ def _models(settings: Settings) -> Mapping[str, Task]:
     stored = settings.of("demonstrations")
     found: dict[str, Task] = {}
     for place in PLACES:
-        for worn in _wearing(place):
-            for fold in (*_folds(settings), *([None] if worn == "all" else [])):
-                for kind, label in _labels(settings, place, worn, fold).items():
-                    if fold is None:
-                        out: Sequence[int] = ()
-                    elif settings.quick or kind == WRITTEN:
-                        out = (fold,)
-                    else:
-                        out = range(AT_ONCE * (fold // AT_ONCE), AT_ONCE * (fold // AT_ONCE + 1))
-                    found[label] = task(tasks.learn, settings, stored, place, worn, kind, tuple(out))
+        for fold in (*_folds(settings), None):
+            for kind, label in _labels(settings, place, fold).items():
+                if fold is None:
+                    out: Sequence[int] = ()
+                elif settings.quick or kind == WRITTEN:
+                    out = (fold,)
+                else:
+                    out = range(AT_ONCE * (fold // AT_ONCE), AT_ONCE * (fold // AT_ONCE + 1))
+                found[label] = task(tasks.learn, settings, stored, place, kind, tuple(out))
     ours_first = sorted(found, key=lambda label: not label.startswith(OURS))  # what takes long begins first
     return {label: found[label] for label in ours_first}
-
-
-def _wearing(place: str) -> tuple[str, ...]:
-    return tuple(tasks.WORN) if place == "lift" else ("all",)
 
 
 def _played(
@@ -92,15 +87,15 @@ def _played(
             settings,
             stored,
             models,
-            _labels(settings, place, what, fold),
+            _labels(settings, place, fold),
             place,
+            what,
             fold,
             tuple(ratios),
             tuple(methods),
         )
         for place in PLACES
         for what in worn
-        if what in _wearing(place)
         for fold in _folds(settings)
     }
 
@@ -117,7 +112,7 @@ def _time(settings: Settings) -> Mapping[str, Task]:
     stored, models = settings.of("demonstrations"), settings.of("models")
     ratios = TIMED[:2] if settings.quick else TIMED
     return {
-        place: task(tasks.take_time, settings, stored, models, _labels(settings, place, "all", 0), place, ratios)
+        place: task(tasks.take_time, settings, stored, models, _labels(settings, place, 0), place, ratios)
         for place in PLACES
     }
 
@@ -131,7 +126,7 @@ def _live(settings: Settings) -> Mapping[str, Task]:
             live.answer,
             settings,
             models,
-            _labels(settings, place, "all", None),
+            _labels(settings, place, None),
             place,
             method,
             range(first, first + at_once),
@@ -240,17 +235,17 @@ def _tell_worn(settings: Settings, found: Found, page: Page) -> None:
     usual = _ratios(settings).index(1.0)
     whole = {label: {n: stored[label][n][[usual]] for n in COMPARED} for label in _temporal(settings)}
     page.say(
-        "The skeleton alone is what a camera sees, the box before the person or not; wearables are both forearms' "
-        "IMU and EMG, and the shoes. The mean of 20 even moments at the interaction's own pace."
+        "Models that know all modalities, of which the others are not read: the skeleton alone is what a camera sees, "
+        "the box before the person or not; wearables are both forearms' IMU and EMG, and the shoes. The mean of 20 "
+        "even moments at the interaction's own pace."
     )
     for which, what in ((ARM, "Error of the arm [rad]"), (PHASE, "Error of the phase")):
         table = Table(f"{what}: worn", list(COMPARED))
         for place in PLACES:
             for worn in tasks.WORN:
                 source = whole if worn == "all" else found
-                if any(label.startswith(f"{place}/{worn}/") for label in source):
-                    errors = _errors(source, place, worn, 0, which)
-                    table.add(f"{TITLES[place]}, {worn}", {name: Cell(errors[name].mean(1)) for name in COMPARED})
+                errors = _errors(source, place, worn, 0, which)
+                table.add(f"{TITLES[place]}, {worn}", {name: Cell(errors[name].mean(1)) for name in COMPARED})
         page.table(table)
 
 

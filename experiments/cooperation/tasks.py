@@ -25,11 +25,9 @@ WORN: dict[str, tuple[str, ...]] = {  # what is left at home
 }
 
 
-def learn(
-    settings: Settings, stored: Stored, place: str, worn: str, kind: str, out: Sequence[int]
-) -> Mapping[str, np.ndarray]:
+def learn(settings: Settings, stored: Stored, place: str, kind: str, out: Sequence[int]) -> Mapping[str, np.ndarray]:
     """The dissertation's model, or ours, of all demonstrations of a place but those that are left out."""
-    demonstrations = without(recorded(stored, place), WORN[worn])
+    demonstrations = recorded(stored, place)
     demonstrations = demonstrations.subset([i for i in range(len(demonstrations)) if i not in out])
     if kind == WRITTEN:
         return {"model": packed(as_written(demonstrations, BASIS))}
@@ -42,23 +40,23 @@ def play(
     models: Stored,
     labels: Mapping[str, str],
     place: str,
+    worn: str,
     fold: int,
     ratios: Sequence[float],
     methods: Sequence[str],
 ) -> Mapping[str, np.ndarray]:
     """{method: (ratios, MARKS, 3)} errors for a demonstration that was left out, distorted in time.
 
-    labels: of the models, by their kind.
+    labels: of the models, by their kind; they know all modalities, whatever is worn.
     """
-    demonstration = recorded(stored, place)[fold]
+    demonstration = without(recorded(stored, place)[fold], WORN[worn])
     known = learned(models, labels)
     found: dict[str, list[np.ndarray]] = {name: [] for name in methods}
-    columns = np.array([OBSERVED.index(name) for name in next(iter(known.values())).observed])
     for ratio in ratios:
         rng = np.random.default_rng([settings.seed, 4000, place == "lift", fold, round(100 * ratio)])
         kept, times = distorted(demonstration, ratio, rng) if ratio != 1 else _whole(demonstration)
         for name in methods:
-            found[name].append(followed(name, known, demonstration, kept, times, fold, columns))
+            found[name].append(followed(name, known, demonstration, kept, times, fold))
     return {name: np.array(errors) for name, errors in found.items()}
 
 
