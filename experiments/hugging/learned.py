@@ -13,10 +13,10 @@ from threadpoolctl import threadpool_limits
 import inphase
 from experiments.hugging.demonstrations import dataset
 from experiments.hugging.hug import OBSERVED
-from experiments.hugging.showing import HANDS, partner_alone
+from experiments.hugging.showing import partner_alone, partner_now
 from experiments.hugging.world import JOINTS
 
-LOOKAHEAD = 0.05  # of the interaction: the operator was late, and joints are
+LOOKAHEAD = 0.025  # of an interaction of ten seconds: the operator was 0.2 to 0.3 s late
 
 
 def learn(taught: Mapping[str, Mapping[str, Any]], calibrate: bool) -> dict[str, Any]:
@@ -49,8 +49,7 @@ class Learned:
     ) -> tuple[np.ndarray, np.ndarray]:
         """What the model says; `look` is the operator's, and not for it."""
         if row is not None:
-            seen = HANDS.sample(dict(zip(OBSERVED, row.tolist(), strict=True)))
-            estimate = self.session.observe(time, {name: seen[name] for name in self.session.model.observed})
+            estimate = self.session.observe(time, partner_now(dict(zip(OBSERVED, row.tolist(), strict=True))))
             self.said = self.session.respond(lookahead=LOOKAHEAD, samples=1).mean[0]
             velocity = (estimate.phase_velocity, estimate.phase_velocity_std)
             self.beliefs.append((estimate.phase, estimate.phase_std, *velocity, estimate.status.trustworthy))

@@ -22,6 +22,12 @@ ARM = {  # by segment: the geom that carries it, along its axis from … to [m],
 }
 CHEST = {f"chest_{side}_{row}": 3 for row in ("high", "low") for side in SIDES}
 BACK = {"back_left_high": 3, "back_right_high": 3, "back_left_low": 3, "back_right_low": 4}
+TORSO = {  # [m] to either side and up from the middle: on the back, where arms lie that hug it
+    "chest_high": ((0.03, 0.13), (0.08, 0.18), (0.13, 0.13)),
+    "chest_low": ((0.03, -0.07), (0.08, -0.02), (0.13, -0.07)),
+    "back_high": ((0.04, 0.25), (0.15, 0.23), (0.13, 0.14)),
+    "back_low": ((0.15, -0.15), (0.13, -0.08), (0.05, -0.10), (0.05, -0.02)),
+}
 ARMS = tuple(f"{side}_{segment}" for side in SIDES for segment in ARM)
 GROUPS = {name: ARM[name.split("_")[1]][4] for name in ARMS} | CHEST | BACK
 SENSORS = {group: tuple(f"touch_{group}_{i}" for i in range(count)) for group, count in GROUPS.items()}
@@ -63,11 +69,10 @@ class Pads:
                 bending.append(model.joint(f"{side}_{joint}").dofadr[0] if much else -1)
                 crease.append(much * (0.3 + 0.7 * ((i * 0.618) % 1)))
         torso = model.body("torso").id
-        for group, count in (CHEST | BACK).items():
-            front, sign = (1 if group in CHEST else -1), (1 if "left" in group else -1)
-            for i in range(count):
-                across = 0.045 + 0.075 * (i % 2) if count > 3 else 0.03 + 0.05 * i
-                height = (0.13 if "high" in group else -0.07) + 0.05 * (i % 2 if count == 3 else i // 2)
+        for group in (*CHEST, *BACK):
+            where, side, row = group.split("_")
+            front, sign = (1 if where == "chest" else -1), (1 if side == "left" else -1)
+            for across, height in TORSO[f"{where}_{row}"][: GROUPS[group]]:
                 bodies.append(torso)
                 places.append((0.095 * front, sign * across, height))
                 bending.append(-1)

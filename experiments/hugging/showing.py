@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
 
 import inphase
 from experiments.hugging import camera
@@ -54,19 +57,38 @@ def grouped_sparse(train: inphase.Dataset) -> Shown:
 
 
 HANDS = inphase.Reduction({f"group_{group}": (SENSORS[group], "max") for group in BACK})
+PRESSED = tuple(f"group_{group}" for group in BACK)
 
 
 def partner_alone(train: inphase.Dataset) -> Shown:
-    """Groups of the back alone, which the partner's hands press, and none that the robot's own arms press, too.
+    """Groups of the back alone, which the partner's arms press, and none that the robot's own arms press, too.
 
-    What the robot does itself would tell it to go on doing it: a robot that holds loosely feels a loose hug.
+    What the robot does itself would tell it to go on doing it: a robot that holds loosely feels a loose hug. Readings
+    are logarithms: whether somebody is there at all says more of the phase than how hard they press.
     """
 
     def change(dataset: inphase.Dataset) -> inphase.Dataset:
         back = [name for group in BACK for name in SENSORS[group]]
-        return HANDS.dataset(dataset.select([*camera.NAMES, *back]))
+        shown = HANDS.dataset(dataset.select([*camera.NAMES, *back]))
+        columns = [shown.names.index(name) for name in PRESSED]
+        demonstrations = []
+        for demonstration in shown:
+            values = demonstration.values.copy()
+            values[:, columns] = _logarithm(values[:, columns])
+            demonstrations.append(replace(demonstration, values=values))
+        return replace(shown, demonstrations=tuple(demonstrations))
 
     return Shown(change(train), None, change)
+
+
+def partner_now(row: dict[str, float]) -> dict[str, float]:
+    """The same of one row of all sensors, by name."""
+    seen = HANDS.sample(row)
+    return {name: seen[name] for name in camera.NAMES} | {name: float(_logarithm(seen[name])) for name in PRESSED}
+
+
+def _logarithm(reading: Any) -> Any:
+    return np.log1p(np.maximum(reading, 0.0))
 
 
 WAYS: dict[str, Callable[[inphase.Dataset], Shown]] = {

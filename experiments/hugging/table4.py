@@ -31,7 +31,6 @@ def cross_validated(
     methods: Mapping[str, str],
     folds: int,
     fold: int,
-    calibrate: bool,
     most: int,
     every: int,
 ) -> dict[str, Any]:
@@ -50,7 +49,7 @@ def cross_validated(
             if name == "as written":
                 model, options = as_written(shown.dataset, shown.bases or UNIFORM), {"members": len(train)}
             else:
-                ours = ours or inphase.fit(shown.dataset, basis=shown.bases, calibrate=calibrate)
+                ours = ours or inphase.fit(shown.dataset, basis=shown.bases, calibrate=False)
                 model, options = ours, {}
             session, errors = model.session(filter, **options), []
             for demonstration in played:
