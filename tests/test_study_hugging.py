@@ -11,11 +11,13 @@ pytest.importorskip("mujoco", reason="the extra [sim] needs Python 3.11")
 
 import mujoco
 
+import inphase
 from experiments.hugging import camera, pads
 from experiments.hugging.demonstrations import CONTROLLED, people, significant, taught
 from experiments.hugging.hug import OBSERVED, Arms
 from experiments.hugging.person import Body
 from experiments.hugging.retarget import WANTED, Retargeting
+from experiments.hugging.showing import partner_alone, partner_now
 from experiments.hugging.success import judge
 from experiments.hugging.world import FASTEST, REST, world
 
@@ -91,6 +93,32 @@ def test_sixty_one_pads_share_what_presses(room):
     assert raw.min() >= 0
     assert raw.max() <= 255
     assert (raw == np.round(raw)).all()
+
+
+def test_sensors_lie_on_the_padding_in_pairs(room):
+    """Left and right mirror each other, but for the one that the right side of the back has more, as in Fig. 26."""
+    sensors, half = pads.Pads.of(room), room.model.geom("torso").size
+    where = {name: sensors.places[i] for i, name in enumerate(pads.NAMES)}
+    for groups, front in ((pads.CHEST, 1), (pads.BACK, -1)):
+        for group in groups:
+            for name in pads.SENSORS[group]:
+                place, other = where[name], name.replace("left", "right")
+                assert place[0] == pytest.approx(front * half[0])
+                assert (np.abs(place[1:]) < half[1:]).all()
+                np.testing.assert_allclose(where[other], place * [1, -1 if other != name else 1, 1])
+
+
+def test_what_is_shown_live_is_what_was_learned(made):
+    """A row of a taught hug is the same to the model, whether it comes from the data set or from the sensors now."""
+    one = made[0]
+    shown = partner_alone(inphase.Dataset.from_arrays([one.times], [one.values], OBSERVED, CONTROLLED)).dataset
+    for i in range(0, len(one.times), 20):
+        now = partner_now(dict(zip(OBSERVED, one.read[i].tolist(), strict=True)))
+        assert tuple(now) == shown.observed
+        np.testing.assert_allclose(list(now.values()), shown[0].values[i, : len(now)])
+    group = [OBSERVED.index(name) for name in pads.SENSORS["back_left_high"]]
+    largest = shown[0].values[:, shown.observed.index("group_back_left_high")]
+    np.testing.assert_allclose(np.exp(largest) - 1, one.read[:, group].max(1))
 
 
 def test_the_robots_push_is_the_partners_push(room):
