@@ -84,10 +84,11 @@ def _density(axis: Any, at: np.ndarray, mean: float, std: float, colour: str) ->
 
 
 def forces(found: Found) -> Figure:
-    """Fig. 35: of two hugs, the force of the left hand that was wanted and the one that came, and one on the back."""
+    """Fig. 35: of a hug of either of two people, the force of the left hand, wanted and felt, and one on the back."""
     from matplotlib.figure import Figure
 
-    labels = [label for label in found if "/long/" in label][:2]
+    long = {label.split("/")[1]: label for label in reversed(found) if "/long/" in label}  # the first of every person
+    labels = [long[who] for who in ("trained", "novel-1", "novel-2") if who in long][:2]
     figure = Figure(figsize=(8.4, 2.3 * max(len(labels), 1)), layout="constrained")
     axes = figure.subplots(max(len(labels), 1), 2, squeeze=False, sharex="row")
     for row, label in enumerate(labels):
@@ -101,7 +102,7 @@ def forces(found: Found) -> Figure:
         axes[row, 1].plot(one["times"], touch[:, back].max(1), color=INK, lw=1.2)
         axes[row, 0].set_ylabel("left hand [raw]")
         axes[row, 1].set_ylabel("back [raw]")
-        axes[row, 0].set_title(label.replace("-", " ").split("/")[1], fontsize=9, loc="left")
+        axes[row, 0].set_title(f"partner: {label.replace('-', ' ').split('/')[1]}", fontsize=9, loc="left")
         for axis in axes[row]:
             plain(axis)
     for axis in axes[-1]:
