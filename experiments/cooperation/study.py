@@ -51,6 +51,11 @@ def _labels(settings: Settings, place: str, fold: int | None) -> dict[str, str]:
 # ------------------------------------------------------------------------------------------------------------- tasks
 
 
+def _slug(method: str) -> str:
+    """A method's name as a part of a label."""
+    return method.replace(", ", "-")
+
+
 def _demonstrations(settings: Settings) -> Mapping[str, Task]:
     at_once = 3 if settings.quick else AT_ONCE
     return {
@@ -122,7 +127,7 @@ def _live(settings: Settings) -> Mapping[str, Task]:
     at_once = min(10, count)
     methods = ("rbpf",) if settings.quick else LIVE
     return {
-        f"{place}/{method}/{first}": task(
+        f"{place}/{_slug(method)}/{first}": task(
             live.answer,
             settings,
             models,
@@ -272,12 +277,14 @@ def _tell_live(settings: Settings, found: Found, page: Page) -> None:
         "and the person waits for the robot, up to four seconds. A hand-over is done when the person holds the can and "
         "the robot does not; a lift, when the box stands on the table. *led* is who demonstrates."
     )
-    methods = [name for name in LIVE if any(f"/{name}/" in label for label in found)]
+    methods = [name for name in LIVE if any(f"/{_slug(name)}/" in label for label in found)]
     rows = (("done", "done", 100.0, "{:.0f} %"), ("the person waited [s]", "waited", 1.0, "{:.1f}"))
     rows = (*rows, ("off where it was needed [cm]", "nearest", 100.0, "{:.1f}"))
     for place in PLACES:
         table = Table(TITLES[place], methods)
-        runs = {name: [found[label] for label in found if label.startswith(f"{place}/{name}/")] for name in methods}
+        runs = {
+            name: [found[label] for label in found if label.startswith(f"{place}/{_slug(name)}/")] for name in methods
+        }
         for what, key, unit, form in rows:
             values = {name: np.concatenate([run[key] for run in runs[name]]) for name in methods}
             table.add(what, {name: form.format(unit * np.mean(v)) for name, v in values.items()})
