@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from experiments.study import Cell, Page, Part, Settings, Stored, Study, Table
-from experiments.study.conduct import conduct
+from experiments.study.conduct import conduct, load
 from experiments.study.interaction_primitive import warped
 from experiments.study.stored import digest
 from experiments.study.table import marked
@@ -244,3 +244,14 @@ def test_bad_input_is_one_line(run, tmp_path):
         code, _, error = run("experiment", "handwriting", *more)
         assert (code, error.count("\n")) == (2, 1)
         assert told in error
+
+
+@pytest.mark.parametrize("name", ["catching", "cooperation", "handshake", "handwriting", "hugging"])
+@pytest.mark.parametrize("quick", [True, False])
+def test_every_task_of_every_study_can_be_kept(name, quick, tmp_path):
+    """A whole study takes hours: that its last part cannot be written is not to be found out then."""
+    pytest.importorskip("mujoco", reason="the extra [sim] needs Python 3.11")
+    settings = Settings(quick, 0, tmp_path)
+    for part, of in load(name).parts.items():
+        files = [settings.of(part).path(label) for label in of.tasks(settings)]
+        assert len(set(files)) == len(files)
