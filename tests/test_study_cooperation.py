@@ -13,12 +13,13 @@ pytest.importorskip("mink")
 import mujoco
 
 from experiments.bodies.person import SHARES
-from experiments.cooperation.demonstrations import distorted
+from experiments.cooperation.demonstrations import distorted, without
 from experiments.cooperation.guide import RATE, frame, led
 from experiments.cooperation.people import Track, someone
 from experiments.cooperation.plan import plan
 from experiments.cooperation.posture import posture, weight_middle
 from experiments.cooperation.sensors import CONTROLLED, OBSERVED, TICK, TRACKED, Moment, Sensors, hidden
+from experiments.cooperation.tasks import WORN
 from experiments.cooperation.trial import Hand, Trial, demonstrated
 from experiments.cooperation.world import HANDOVER, LIFT, STEP, Place, World
 from inphase.trajectory import Demonstration
@@ -234,3 +235,16 @@ def test_samples_are_deleted_and_doubled_in_their_order(ratio):
     assert (np.diff(kept) >= (1 if ratio < 1 else 0)).all()
     assert np.diff(times) == pytest.approx(1 / 30)
     assert ratio < 1 or set(kept) == set(range(80))
+
+
+@pytest.mark.parametrize(("worn", "read"), [("all", 67), ("skeleton", 39), ("wearables", 28)])
+def test_of_what_is_not_worn_nothing_is_read(shown, worn, read):
+    """39 channels of the camera's, 28 of what is worn; the robot's own are left as they are."""
+    _, trial = shown
+    demonstration = Demonstration(trial.times, np.nan_to_num(trial.values))
+    left = without(demonstration, WORN[worn]).values
+    seen = np.isfinite(left[:, : len(OBSERVED)])
+    assert (seen.all(0) == seen.any(0)).all()
+    assert seen.all(0).sum() == read
+    np.testing.assert_array_equal(left[np.isfinite(left)], demonstration.values[np.isfinite(left)])
+    np.testing.assert_array_equal(left[:, len(OBSERVED) :], demonstration.values[:, len(OBSERVED) :])
