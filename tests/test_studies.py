@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from experiments.study import Cell, Page, Part, Settings, Stored, Study, Table
+from experiments.study.compared import pairs
 from experiments.study.conduct import conduct, load
 from experiments.study.interaction_primitive import warped
 from experiments.study.stored import digest
@@ -255,3 +256,36 @@ def test_every_task_of_every_study_can_be_kept(name, quick, tmp_path):
     for part, of in load(name).parts.items():
         files = [settings.of(part).path(label) for label in of.tasks(settings)]
         assert len(set(files)) == len(files)
+
+
+def test_errors_are_compared_as_they_are_printed():
+    """Columns of one table, or one table a method; what is no error, or has not both filters, is left out."""
+    told = """
+| Error of the arm | IP | eBIP | rbpf |
+|---|---:|---:|---:|
+| 0.5 | 0.1 | 0.300 ≈ (0.34) | **0.100** |
+| 1 | 0.1 | 0.020 | 0.040 |
+
+| Milliseconds a sample | eBIP | rbpf |
+|---|---:|---:|
+| 70 | 1.0 | 3.0 |
+
+| Error of another | IP | rbpf |
+|---|---:|---:|
+| 1 | 1.0 | 3.0 |
+
+**ebip, the model as the dissertation writes it**:
+
+|  | All | Group |
+|---|---:|---:|
+| Dimension | 700 (664) | 400 |
+| 0.05 Joints | **0.090** (0.191) | 0.5 |
+
+**rbpf on what is learned**:
+
+|  | All | Group |
+|---|---:|---:|
+| Dimension | 700 | 400 |
+| 0.05 Joints | 0.03 | **0.1** |
+"""
+    np.testing.assert_allclose(pairs(told), [[0.3, 0.1], [0.02, 0.04], [0.09, 0.03], [0.5, 0.1]])

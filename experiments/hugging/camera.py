@@ -1,4 +1,4 @@
-"""The camera behind the partner, and what a pose estimator makes of its picture: five points, 30 times a second."""
+"""The camera behind the partner, and what a pose estimator makes of its picture: seven points, 30 times a second."""
 
 from __future__ import annotations
 
