@@ -15,16 +15,17 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from experiments.bodies.arm import JOINTS, TORQUE, VELOCITY
 from experiments.bodies.person import SHARES, bent
-from experiments.catching import flight, thrower
+from experiments.catching import flight, motion
 from experiments.catching.demonstrations import demonstrated, thrown
 from experiments.catching.expert import demonstrate, plan
 from experiments.catching.sensors import KINDS, MODALITIES, OBSERVED, Watch, watches
+from experiments.catching.thrower import Throw
 from experiments.catching.world import HOME, World, built
 from inphase.runtime import FakeClock, Sensor
 
 
 @pytest.fixture(scope="module")
-def caught() -> tuple[thrower.Throw, World]:
+def caught() -> tuple[Throw, World]:
     """A throw that the expert caught."""
     happens, rng = thrown(0, 1, 0)
     planned = plan(happens, rng)
@@ -59,7 +60,7 @@ def test_an_aimed_ball_arrives_and_is_found_where_it_passes() -> None:
     assert flight.crossing(begin, -velocity, lambda place: place[0] - 0.6) is None
 
 
-def test_the_simulated_ball_flies_as_it_was_thrown(caught: tuple[thrower.Throw, World]) -> None:
+def test_the_simulated_ball_flies_as_it_was_thrown(caught: tuple[Throw, World]) -> None:
     happens, world = caught
     assert world.entered is not None
     seen = [moment for moment in world.log if np.isfinite(moment.ball).all() and moment.time < world.entered - 0.05]
@@ -115,11 +116,11 @@ def test_a_body_stays_in_one_piece_and_its_ball_leaves_as_the_hand_moves(number:
         for limb, begin, end in (("upper_arm", "shoulder", "elbow"), ("forearm", "elbow", "wrist")):
             long = np.linalg.norm(happens.joints[f"{side}_{end}"] - happens.joints[f"{side}_{begin}"], axis=1)
             np.testing.assert_allclose(long, SHARES[limb] * h, rtol=0.03)
-    i = round(happens.release / thrower.STEP)
-    moves = (happens.hand[i + 1] - happens.hand[i - 1]) / (2 * thrower.STEP)
+    i = round(happens.release / motion.STEP)
+    moves = (happens.hand[i + 1] - happens.hand[i - 1]) / (2 * motion.STEP)
     assert np.linalg.norm(happens.velocity - moves) < 0.3  # fingers
     assert 3.5 < np.linalg.norm(happens.velocity) < 8
-    fastest = {n: np.linalg.norm(np.diff(p, axis=0), axis=1).max() / thrower.STEP for n, p in happens.joints.items()}
+    fastest = {n: np.linalg.norm(np.diff(p, axis=0), axis=1).max() / motion.STEP for n, p in happens.joints.items()}
     assert max(fastest[name] for name in fastest if "elbow" not in name) < 12  # [m/s] nothing jumps
     assert max(fastest.values()) < 20  # an arm that is nearly straight snaps
 
@@ -153,7 +154,7 @@ def test_throws_differ_and_are_the_same_with_one_seed() -> None:
 # ------------------------------------------------------------------------------------------------------------ sensors
 
 
-def test_sensors_read_at_their_rates_late_and_see_no_ball_in_a_hand(caught: tuple[thrower.Throw, World]) -> None:
+def test_sensors_read_at_their_rates_late_and_see_no_ball_in_a_hand(caught: tuple[Throw, World]) -> None:
     happens, world = caught
     assert world.entered is not None
     clock, until = FakeClock(), world.entered + 0.2
@@ -179,7 +180,7 @@ def test_sensors_read_at_their_rates_late_and_see_no_ball_in_a_hand(caught: tupl
             np.testing.assert_allclose([np.linalg.norm(s.values) for s in samples], 1.0)
 
 
-def test_a_sensor_that_falls_silent_says_nothing_more(caught: tuple[thrower.Throw, World]) -> None:
+def test_a_sensor_that_falls_silent_says_nothing_more(caught: tuple[Throw, World]) -> None:
     _, world = caught
     clock = FakeClock()
     imu = Watch("imu", world, np.random.default_rng(0), silent=0.5)
@@ -191,7 +192,7 @@ def test_a_sensor_that_falls_silent_says_nothing_more(caught: tuple[thrower.Thro
 # ------------------------------------------------------------------------------------------------------- the expert
 
 
-def test_the_expert_catches_what_it_shows_without_hurry(caught: tuple[thrower.Throw, World]) -> None:
+def test_the_expert_catches_what_it_shows_without_hurry(caught: tuple[Throw, World]) -> None:
     _, world = caught
     assert world.inside
     joints = np.array([moment.joints for moment in world.log])

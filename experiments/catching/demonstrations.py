@@ -11,7 +11,8 @@ import inphase
 from experiments.bodies.arm import JOINTS
 from experiments.catching.expert import demonstrate, plan
 from experiments.catching.sensors import MODALITIES, OBSERVED, UNITS, Watch, watches
-from experiments.catching.thrower import Style, Throw, style, throw
+from experiments.catching.style import Style, style
+from experiments.catching.thrower import Throw, throw
 from experiments.catching.world import World
 from inphase.runtime import FakeClock, SensorRecording, combine
 from inphase.trajectory import Demonstration
