@@ -10,8 +10,9 @@ import mujoco
 import numpy as np
 
 from experiments.hugging import camera
+from experiments.hugging.moved import Person
 from experiments.hugging.pads import ARM, ARMS, NAMES, Pads, largest
-from experiments.hugging.partner import Person, Visit
+from experiments.hugging.partner import Visit
 from experiments.hugging.person import FROM
 from experiments.hugging.retarget import Retargeting
 from experiments.hugging.world import FASTEST, PERIOD, SIDES, World

@@ -15,6 +15,7 @@ from experiments.hugging.success import judge
 from experiments.hugging.world import world
 from experiments.study.film import camera
 
+FILTERS = ("rbpf", "ebip")
 CASES = {"long": 6, "short": 6, "nothing": 2, "late": 2, "raised": 2, "air": 2, "apart": 2}  # times, a person
 PARTNERS = {"trained": 0, "novel 1": TRAINED, "novel 2": TRAINED + 1}  # among those of demonstrations.people
 NAMES = {
