@@ -9,12 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import inphase
 from experiments.study import Cell, Page, Part, Settings, Stored, Study, Table
+from experiments.study.as_written import as_written
 from experiments.study.compared import pairs
 from experiments.study.conduct import conduct, load
 from experiments.study.interaction_primitive import warped
 from experiments.study.stored import digest
 from experiments.study.table import marked
+from inphase.basis import Gaussian
 from inphase.errors import DataError, OptionError
 from inphase.workers import workers
 
@@ -289,3 +292,27 @@ def test_errors_are_compared_as_they_are_printed():
 | 0.05 Joints | 0.03 | **0.1** |
 """
     np.testing.assert_allclose(pairs(told), [[0.3, 0.1], [0.02, 0.04], [0.09, 0.03], [0.5, 0.1]])
+
+
+def test_the_model_as_written_has_white_noise_of_the_regression_and_else_what_was_demonstrated() -> None:
+    """Eq. 2.15 by a least-squares fit of its own; the noise that is learned, asked for, is all that differs."""
+    rng, times = np.random.default_rng(0), np.arange(200) / 100
+    phases = np.linspace(0, 1, 200)
+    curves = [
+        rng.normal(1, 0.2) * np.column_stack([np.sin(5 * phases), np.cos(5 * phases)])
+        + 0.2 * np.cumsum(rng.normal(0, 0.05, (200, 2)), 0)
+        for _ in range(6)
+    ]
+    dataset = inphase.Dataset.from_arrays([times] * 6, curves, ["person"], ["robot"])
+    basis = Gaussian(6)
+    model, learned = as_written(dataset, basis), as_written(dataset, basis, white=False)
+    functions = basis(phases)
+    left = [curve - functions @ np.linalg.lstsq(functions, curve, rcond=None)[0] for curve in curves]
+    var = np.mean([(r**2).mean(0) for r in left], axis=0)
+    np.testing.assert_allclose(model.scaling.unscale_var(model.noise.var), var, rtol=0.02)
+    assert not model.noise.correlation_time.any()
+    assert (learned.noise.correlation_time > 0).all()
+    assert (learned.noise.var > 2 * model.noise.var).all()  # of what others explain, more is left
+    for each in (model, learned):
+        assert (each.prior.trust, each.prior.shrinkage, each.reflex) == (1.0, 0.0, None)
+        np.testing.assert_array_equal(each.prior.samples, model.prior.samples)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -29,13 +29,16 @@ FIRST = 3  # joints, of which Table 2 tells
 COURSE = np.linspace(0.05, 0.95, 19)  # phases at which Fig. 28 looks
 
 
+Methods: TypeAlias = Mapping[str, tuple[inphase.Model, Mapping[str, Any]]]
+
+
 def chosen_basis(dataset: inphase.Dataset) -> dict[str, Basis]:
     """For every object that is sensed, what the Bayesian information criterion chooses of three families (3.3.1)."""
     candidates = [basis for n in SIZES for basis in (Gaussian(n), Sigmoid(n), Polynomial(n - 1))]
     return inphase.select_basis(dataset, candidates=candidates, per="group").best("bic")
 
 
-def methods(train: inphase.Dataset, calibrate: bool) -> dict[str, tuple[inphase.Model, dict[str, Any]]]:
+def methods(train: inphase.Dataset, calibrate: bool) -> Methods:
     """The dissertation's methods on its own model, with as many members as demonstrations, and ours on `fit`."""
     written = as_written(train, chosen_basis(train))
     ours = inphase.fit(train, calibrate=calibrate)
@@ -47,6 +50,16 @@ def methods(train: inphase.Dataset, calibrate: bool) -> dict[str, tuple[inphase.
         "eBIP": (written, {"filter": "ebip", "members": every}),
         "eBIP, calibrated": (ours, {"filter": "ebip"}),
         "rbpf": (ours, {}),
+    }
+
+
+def learned_noise(train: inphase.Dataset) -> Methods:
+    """The dissertation's ensembles and particles, on its own model but for the noise, which is learned."""
+    model, every = as_written(train, chosen_basis(train), white=False), len(train)
+    return {
+        "PF": (model, {"filter": "particle", "particles": every}),
+        "eBIP-": (model, {"filter": "ebip", "members": every, "prior": "mixture"}),
+        "eBIP": (model, {"filter": "ebip", "members": every}),
     }
 
 
@@ -62,13 +75,18 @@ def split(dataset: inphase.Dataset, folds: int, fold: int, seed: int) -> tuple[i
 
 
 def cross_validated(
-    found: Found, folds: int, fold: int, seed: int, calibrate: bool = True, most: int | None = None
+    found: Found,
+    compared: Callable[[inphase.Dataset], Methods],
+    folds: int,
+    fold: int,
+    seed: int,
+    most: int | None = None,
 ) -> dict[str, np.ndarray]:
     """One fold: by "what/column/method", (tests, marks) errors; by "course/method", (tests, phases) of the ball's."""
     train, test = split(gathered(found), folds, fold, seed)
     results: dict[str, list[Any]] = {}
-    compared = methods(train, calibrate)
-    for method, (model, options) in compared.items():
+    taught = compared(train)
+    for method, (model, options) in taught.items():
         session = model.session(seed=seed, **options)
         for column, modalities in COLUMNS.items():
             for demonstration in list(test)[:most]:
@@ -81,7 +99,10 @@ def cross_validated(
                     results.setdefault(key, []).append([errors[mark][i] for mark in MARKS])
                 if column == "All":
                     results.setdefault(f"course/{method}", []).append([errors[phase][1] for phase in COURSE])
-    sizes: dict[str, Any] = {"weights": compared["BIP"][0].layout.slices[-1].stop, "demonstrations": len(train)}
+    sizes: dict[str, Any] = {
+        "weights": next(iter(taught.values()))[0].layout.slices[-1].stop,
+        "demonstrations": len(train),
+    }
     return {name: np.array(values) for name, values in {**results, **sizes}.items()}
 
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 from experiments.catching import told
 from experiments.catching.closed_loop import in_the_loop, learned, strangers
 from experiments.catching.demonstrations import make
 from experiments.catching.film import filmed
-from experiments.catching.prediction import cross_validated
+from experiments.catching.prediction import Methods, cross_validated, learned_noise, methods
 from experiments.catching.trade_off import by_members
 from experiments.catching.trial import CONDITIONS
 from experiments.study import Part, Settings, Study, Task, task
+from inphase import Dataset
 
 DEMONSTRATIONS, FOLDS, THROWS = 221, 10, 200
 CHUNK = 20
@@ -28,9 +30,17 @@ def _demonstrations(settings: Settings) -> dict[str, Task]:
 
 
 def _prediction(settings: Settings) -> dict[str, Task]:
+    return _folds(settings, partial(methods, calibrate=not settings.quick))
+
+
+def _noise(settings: Settings) -> dict[str, Task]:
+    return _folds(settings, learned_noise)
+
+
+def _folds(settings: Settings, compared: Callable[[Dataset], Methods]) -> dict[str, Task]:
     found = settings.of("demonstrations")
     count, most = (1, 3) if settings.quick else (FOLDS, None)
-    whole = partial(cross_validated, found, FOLDS, seed=settings.seed, calibrate=not settings.quick, most=most)
+    whole = partial(cross_validated, found, compared, FOLDS, seed=settings.seed, most=most)
     return {f"fold-{fold}": task(whole, fold=fold) for fold in range(count)}
 
 
@@ -77,6 +87,9 @@ STUDY = Study(
             _prediction,
             told.prediction,
             needs=("demonstrations",),
+        ),
+        "noise": Part(
+            "The same with noise that is learned", _noise, told.noise, needs=("demonstrations", "prediction")
         ),
         "trade-off": Part(
             "Time, accuracy and members (Fig. 29)", _trade_off, told.trade_off, needs=("demonstrations",)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 from experiments.catching import figures
@@ -16,6 +18,7 @@ an IMU on the throwing forearm, eight pressures in the shoes, the head and, once
 each at its own rate, late and with noise. The robot knows nothing of balls: it learned from demonstrations of throws
 that an expert caught. In brackets are the dissertation's numbers, of real throws.
 """
+ENSEMBLES = ("PF", "eBIP-", "eBIP")
 METHODS = ("BIP", "PF", "eBIP-", "eBIP", "eBIP, calibrated", "rbpf")
 JOINTS_TOLD = {
     (0, "BIP"): ["–", "3.91·10^15", "1.48·10^14", "9.56·10^14", "3.97·10^16"],
@@ -27,7 +30,8 @@ JOINTS_TOLD = {
     (1, "eBIP-"): ["10.52", "9.46·10^6", "1.36·10^7", "1.68·10^7", "7.66·10^7"],
     (1, "eBIP"): ["0.05", "0.20", "0.19", "0.11", "0.09"],
 }
-BALL_COLUMNS = ("Ball", "Shoe, IMU, Head, Ball", "All")
+COLUMNS_OF = {"joints": tuple(COLUMNS), "ball": ("Ball", "Shoe, IMU, Head, Ball", "All")}
+HEADS = {"joints": "Mean squared error of three joints [rad²]", "ball": "Mean absolute error of the ball [m]"}
 BALL_TOLD = {
     (0, "BIP"): ["–", "116.93", "1.35·10^3"],
     (0, "PF"): ["–", "0.61", "0.61"],
@@ -60,24 +64,56 @@ def prediction(settings: Settings, found: Found, page: Page) -> None:
         "a session takes when no filter is named. One model of all modalities serves all rows: what a row does not "
         "name is not observed."
     )
-    _errors(page, found, "joints", COLUMNS, JOINTS_TOLD, "Mean squared error of three joints [rad²]")
-    _errors(page, found, "ball", BALL_COLUMNS, BALL_TOLD, "Mean absolute error of the ball [m]")
+    told = {"joints": JOINTS_TOLD, "ball": BALL_TOLD}
+    for what in COLUMNS_OF:
+        _errors(page, found, what, METHODS, told[what])
     course = {name: joined(found, f"course/{name}") for name in METHODS}
     page.picture(figures.course(COURSE, course), "ball", "Error of the ball at the catch, foreseen over the phase")
     theirs = joined(found, "joints/All/rbpf")[:, 1].mean() / joined(found, "joints/All/eBIP")[:, 1].mean()
     page.say(f"At 82 % with all modalities, `rbpf` has {theirs:.2f} times the joint error of eBIP as written.")
 
 
-def _errors(page: Page, found: Found, what: str, columns: object, told: dict, corner: str) -> None:  # type: ignore[type-arg]
-    table = Table(corner, list(METHODS))
-    names = list(columns)  # type: ignore[call-overload]
-    for i, mark in enumerate(MARKS):
-        for column, name in enumerate(names):
-            if i == 0 and name == "Ball":
-                continue  # nothing of it was seen
-            cells = {method: Cell(joined(found, f"{what}/{name}/{method}")[:, i]) for method in METHODS}
-            theirs = {m: told[i, m][column] for m in METHODS if (i, m) in told}
-            table.add(f"{mark:.0%} {name}", cells, theirs)
+def noise(settings: Settings, found: Found, page: Page) -> None:
+    """Tables 2 and 3 of ensembles and particles that know how sure a reading makes, and in how many cells eBIP wins."""
+    page.say(
+        "What white noise does: model, ensembles and particles as the dissertation writes them, but instead of the "
+        "noise of the regression (Eq. 2.15) there is what `inphase.fit` learns of demonstrations that are left out."
+    )
+    for what in COLUMNS_OF:
+        _errors(page, found, what, ENSEMBLES)
+    written = settings.of("prediction")
+    for other in ENSEMBLES[:2]:
+        won = {name: _won(each, other) for name, each in (("as written", written), ("with learned noise", found))}
+        page.say(
+            f"eBIP beats {other} "
+            + ", ".join(f"in {sum(cells)} of {len(cells)} cells {name}" for name, cells in won.items())
+            + "."
+        )
+
+
+def _won(found: Found, other: str) -> list[bool]:
+    """Whether eBIP's mean error is less, in every cell of both tables."""
+    return [
+        bool(joined(found, f"{what}/{name}/eBIP")[:, i].mean() < joined(found, f"{what}/{name}/{other}")[:, i].mean())
+        for what in COLUMNS_OF
+        for i, name in _rows(what)
+    ]
+
+
+def _rows(what: str) -> list[tuple[int, str]]:
+    """Moments and modalities of a table: before the throw the ball alone says nothing."""
+    return [(i, name) for i in range(len(MARKS)) for name in COLUMNS_OF[what] if i or name != "Ball"]
+
+
+def _errors(
+    page: Page, found: Found, what: str, methods: Sequence[str], told: Mapping[tuple[int, str], Sequence[str]] = {}
+) -> None:
+    table = Table(HEADS[what], list(methods))
+    for i, name in _rows(what):
+        cells = {method: Cell(joined(found, f"{what}/{name}/{method}")[:, i]) for method in methods}
+        column = list(COLUMNS_OF[what]).index(name)
+        theirs = {method: told[i, method][column] for method in methods if (i, method) in told}
+        table.add(f"{MARKS[i]:.0%} {name}", cells, theirs)
     page.table(table)
 
 

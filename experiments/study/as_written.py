@@ -14,13 +14,17 @@ from inphase.noise import Noise
 from inphase.training.noise import regression_noise
 
 
-def as_written(dataset: inphase.Dataset, basis: Basis | Mapping[str, Basis]) -> inphase.Model:
+def as_written(dataset: inphase.Dataset, basis: Basis | Mapping[str, Basis], *, white: bool = True) -> inphase.Model:
     """Weights as the demonstrations have them, their sample covariance, and white noise of the regression (Eq. 2.15).
 
-    No shrinkage, no trust less than whole, no reflex, nothing held out: what chapters 2 and 3 compare.
+    No shrinkage, no trust less than whole, no reflex, nothing held out: what chapters 2 and 3 compare. white: False for
+    the noise that `inphase.fit` learns, and all else as written, to see what the noise does.
     """
     model = inphase.fit(dataset, basis=basis, shrinkage=0.0, calibrate=False)
+    written = replace(model, prior=replace(model.prior, trust=1.0), reflex=None)
+    if not white:
+        return written
     scaled = [model.scaling.scale(model.coordinates.from_channels(demonstration.values)) for demonstration in dataset]
     left = residuals(model.layout, [d.phases for d in dataset], scaled, model.prior.samples)
     var = regression_noise([d.times for d in dataset], left).var
-    return replace(model, prior=replace(model.prior, trust=1.0), noise=Noise(var, np.zeros(len(var))), reflex=None)
+    return replace(written, noise=Noise(var, np.zeros(len(var))))
