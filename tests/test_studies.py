@@ -291,7 +291,9 @@ def test_errors_are_compared_as_they_are_printed():
 | Dimension | 700 | 400 |
 | 0.05 Joints | 0.03 | **0.1** |
 """
-    np.testing.assert_allclose(pairs(told), [[0.3, 0.1], [0.02, 0.04], [0.09, 0.03], [0.5, 0.1]])
+    np.testing.assert_allclose(pairs(told), [[0.1, 0.3], [0.04, 0.02], [0.03, 0.09], [0.1, 0.5]])
+    np.testing.assert_allclose(pairs(told, "eBIP", "IP"), [[0.3, 0.1], [0.02, 0.1]])
+    assert len(pairs(told, "BIP", "IP")) == 0
 
 
 def test_the_model_as_written_has_white_noise_of_the_regression_and_else_what_was_demonstrated() -> None:

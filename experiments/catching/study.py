@@ -88,9 +88,7 @@ STUDY = Study(
             told.prediction,
             needs=("demonstrations",),
         ),
-        "noise": Part(
-            "The same with noise that is learned", _noise, told.noise, needs=("demonstrations", "prediction")
-        ),
+        "noise": Part("The same with noise that is learned", _noise, told.noise, needs=("demonstrations",)),
         "trade-off": Part(
             "Time, accuracy and members (Fig. 29)", _trade_off, told.trade_off, needs=("demonstrations",)
         ),

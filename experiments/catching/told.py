@@ -74,30 +74,13 @@ def prediction(settings: Settings, found: Found, page: Page) -> None:
 
 
 def noise(settings: Settings, found: Found, page: Page) -> None:
-    """Tables 2 and 3 of ensembles and particles that know how sure a reading makes, and in how many cells eBIP wins."""
+    """Tables 2 and 3 of ensembles and particles that know how sure a reading makes."""
     page.say(
         "What white noise does: model, ensembles and particles as the dissertation writes them, but instead of the "
         "noise of the regression (Eq. 2.15) there is what `inphase.fit` learns of demonstrations that are left out."
     )
     for what in COLUMNS_OF:
         _errors(page, found, what, ENSEMBLES)
-    written = settings.of("prediction")
-    for other in ENSEMBLES[:2]:
-        won = {name: _won(each, other) for name, each in (("as written", written), ("with learned noise", found))}
-        page.say(
-            f"eBIP beats {other} "
-            + ", ".join(f"in {sum(cells)} of {len(cells)} cells {name}" for name, cells in won.items())
-            + "."
-        )
-
-
-def _won(found: Found, other: str) -> list[bool]:
-    """Whether eBIP's mean error is less, in every cell of both tables."""
-    return [
-        bool(joined(found, f"{what}/{name}/eBIP")[:, i].mean() < joined(found, f"{what}/{name}/{other}")[:, i].mean())
-        for what in COLUMNS_OF
-        for i, name in _rows(what)
-    ]
 
 
 def _rows(what: str) -> list[tuple[int, str]]:
