@@ -10,7 +10,7 @@ pytest.importorskip("mujoco", reason="pip install 'inphase[sim]'")
 from experiments.handshake.anatomy import ARMS, SIZES, STILL, contraction
 from experiments.handshake.demonstrations import follow
 from experiments.handshake.encounter import Encounter, Told
-from experiments.handshake.measures import apart, at_end, completion
+from experiments.handshake.measures import apart, at_end, completion, gone
 from experiments.handshake.muscle import AIR, DEAD, MEGA, Pneumatics
 from experiments.handshake.partner import STEP, Partner, Style
 from experiments.handshake.robot import Arm
@@ -168,3 +168,10 @@ def test_completion_is_when_the_last_channel_comes_to_rest() -> None:
     assert completion(np.zeros((301, 30))) == 0
     read[:, 7] = 0.2 * np.sin(np.arange(301))
     assert completion(read) == 1
+
+
+def test_how_much_of_the_way_is_gone_is_of_the_way_and_not_of_the_axes() -> None:
+    """A reach of three seconds at one speed, begun after one: so much of it after so much time."""
+    share = np.clip(np.arange(301) / 30 - 1, 0, 3)[:, None] / 3
+    hand = np.array([0.9, -0.2, 1.1]) + share * [-0.4, 0.3, 0.0]
+    assert [gone(hand, part) for part in (0.1, 0.5, 0.9)] == pytest.approx([1.3, 2.5, 3.7], abs=1 / 30)

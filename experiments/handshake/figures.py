@@ -8,22 +8,21 @@ import numpy as np
 
 from experiments.handshake.anatomy import NAMES, STILL
 from experiments.handshake.measures import correlations, sliding
-from experiments.handshake.partner import SPEEDS
 from experiments.handshake.sensors import HAND, RATE
-from experiments.handshake.tell import LED, played, trials
+from experiments.handshake.tell import LED, trials
 from experiments.handshake.tell import NAMES as METHODS
 from experiments.handshake.trajectories import TESTING
 from experiments.study import Found, Page, Settings, Table
-from inphase.report.look import COLOURS, INK, NOW, PAST, plain
+from inphase.report.look import COLOURS, NOW, PAST, plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-REGIONS = (("#d1603d", "has not moved"), ("#3f8f5f", "moves"), ("#0b6e99", "has arrived"))
 SHOWN = ("bip", "rbpf")
 
 
-def _figure(rows: int, columns: int, size: tuple[float, float], **options: object) -> tuple[Figure, np.ndarray]:
+def panels(rows: int, columns: int, size: tuple[float, float], **options: object) -> tuple[Figure, np.ndarray]:
+    """A figure and its axes (rows, columns), in the look of all pictures."""
     from matplotlib.figure import Figure as New
 
     figure = New(figsize=size, layout="constrained")
@@ -33,99 +32,12 @@ def _figure(rows: int, columns: int, size: tuple[float, float], **options: objec
     return figure, axes
 
 
-def phase(settings: Settings, found: Found, page: Page) -> None:
-    """Figs. 15 and 16."""
-    leading = settings.of("leading")
-    for method in SHOWN:
-        page.picture(_regions(settings, method), f"phase-{method}", f"phase at the ends of three regions, {method}")
-    page.picture(_distributions(settings), "phase-all", "phase and velocity when the partner has arrived")
-    methods = played(leading)
-    table = Table("when the partner has arrived, mean ± std", list(methods.values()))
-    rows: dict[str, dict[str, str]] = {}
-    ratios = {}
-    for method, column in methods.items():
-        at = {s: trials(leading, i, len(LED), "at_moments", method)[0] for i, s in enumerate(LED)}
-        for speed in ("fast", "normal", "slow", "paused"):
-            green = at[speed][:, 1]
-            for name, k in (("phase", 0), ("velocity [1/s]", 2)):
-                rows.setdefault(f"{name}, {speed}", {})[column] = f"{green[:, k].mean():.3f} ± {green[:, k].std():.3f}"
-        rows.setdefault("velocity of a still partner at the end", {})[column] = f"{at['still'][:, 2, 2].mean():.4f}"
-        rows.setdefault("velocity at the end of a pause", {})[column] = f"{at['paused'][:, 0, 2].mean():.4f}"
-        ratios[method] = [float(np.median(at["fast"][:, 1, k]) / np.median(at["slow"][:, 1, k])) for k in (0, 2)]
-    for name in sorted(rows):
-        table.add(name, rows[name])
-    page.table(table)
-    page.say(
-        "Fast against slow, when the partner has arrived (ratio of the medians): "
-        + "; ".join(f"{m} phase {p:.2f}, velocity {v:.2f}" for m, (p, v) in ratios.items())
-        + ". The dissertation's finding, that the phase is the same and the velocity is not, would be 1 and the ratio "
-        f"of the tempi, {SPEEDS['slow'] / SPEEDS['fast']:.0f}."
-    )
-
-
-def _regions(settings: Settings, method: str) -> Figure:
-    """Fig. 15 and the right of Fig. 16, of the first person."""
-    leading = settings.of("leading")
-    figure, axes = _figure(3, len(LED), (12, 6), sharey="row")
-    times = np.arange(301) / RATE
-    for i, speed in enumerate(LED):
-        truth = trials(leading, i, len(LED), "truth", method)[0][0]
-        read = trials(leading, i, len(LED), "read", method)[0][0]
-        moments = trials(leading, i, len(LED), "moments", method)[0][0]
-        beliefs = trials(leading, i, len(LED), "at_moments", method)[0][0]
-        top, middle, bottom = axes[:, i]
-        top.plot(times[: len(truth)], read[:, 0], color=INK, lw=1)
-        top.set_title(speed, fontsize=10)
-        top.set_xlabel("time [s]")
-        edges = [0.0, *np.minimum(moments, 10.0)] if np.isfinite(moments).all() else [0.0, 10.0]
-        for r, (colour, _) in enumerate(REGIONS[: len(edges) - 1]):
-            top.axvspan(edges[r], edges[r + 1], color=colour, alpha=0.18, lw=0)
-            _density(middle, *beliefs[r if len(edges) > 2 else 2, :2], (-0.05, 1.05), colour)
-            _density(bottom, *beliefs[r if len(edges) > 2 else 2, 2:], (-0.3, 0.6), colour)
-        middle.set_xlabel("phase")
-        bottom.set_xlabel("phase velocity [1/s]")
-    axes[0, 0].set_ylabel("hand x [m]")
-    axes[1, 0].set_ylabel("density")
-    axes[2, 0].set_ylabel("density")
-    figure.suptitle(f"{METHODS[method]}: at the end of each region", fontsize=11)
-    return figure
-
-
-def _density(ax: object, mean: float, std: float, limits: tuple[float, float], colour: str) -> None:
-    """A Gaussian, its height 1 so that sharp ones and wide ones can be seen together."""
-    x = np.linspace(*limits, 400)
-    std = max(std, 0.004 * (limits[1] - limits[0]))
-    y = np.exp(-0.5 * ((x - mean) / std) ** 2)
-    ax.fill_between(x, y, color=colour, alpha=0.35, lw=0)  # type: ignore[attr-defined]
-    ax.plot(x, y, color=colour, lw=1)  # type: ignore[attr-defined]
-    ax.set_yticks([])  # type: ignore[attr-defined]
-
-
-def _distributions(settings: Settings) -> Figure:
-    """The left of Fig. 16, of all tests, for every method."""
-    leading = settings.of("leading")
-    methods = played(leading)
-    figure, axes = _figure(2, len(methods), (10, 4.6), sharey=False)
-    for j, (method, title) in enumerate(methods.items()):
-        axes[0, j].set_title(title, fontsize=10)
-        for k, (row, name, limits) in enumerate(((0, "phase", (0, 1)), (2, "phase velocity [1/s]", (-0.1, 0.6)))):
-            ax = axes[k, j]
-            for i, speed in enumerate(LED[:3]):
-                values = np.clip(trials(leading, i, len(LED), "at_moments", method)[0][:, 1, row], *limits)
-                ax.hist(values, np.linspace(*limits, 26), color=COLOURS[i], alpha=0.5, label=speed)
-            ax.set_xlabel(name)
-    axes[0, 0].set_ylabel("tests")
-    axes[1, 0].set_ylabel("tests")
-    axes[0, 0].legend(frameon=False, fontsize=8)
-    return figure
-
-
 def prediction(settings: Settings, found: Found, page: Page) -> None:
     """Fig. 17: normal, fast, and fast to another place."""
     leading = settings.of("leading")
     muscle = NAMES.index("biceps")
     rows = (("normal", 0), ("fast", 0), ("fast", -1))
-    figure, axes = _figure(3, len(SHOWN), (10, 7), sharex=True, sharey=True)
+    figure, axes = panels(3, len(SHOWN), (10, 7), sharex=True, sharey=True)
     times = np.arange(301) / RATE
     for j, method in enumerate(SHOWN):
         for ax, (speed, which) in zip(axes[:, j], rows, strict=True):
@@ -162,7 +74,7 @@ def profiles(settings: Settings, found: Found, page: Page) -> None:
     groups = {"static": np.concatenate([trials(static, i, len(TESTING), "truth")[0] for i in range(len(TESTING))])}
     # Who leads does the same whoever moves the robot.
     groups["partner leads"] = np.concatenate([trials(leading, i, len(LED), "truth", "rbpf")[0] for i in range(3)])
-    figure, axes = _figure(3, 2, (9, 6.5), sharex=True)
+    figure, axes = panels(3, 2, (9, 6.5), sharex=True)
     times, peaks = np.arange(301) / RATE, {}
     for colour, (name, truth) in zip((COLOURS[1], NOW), groups.items(), strict=True):
         hand = truth[:, :, 3:].astype(float)
@@ -189,7 +101,7 @@ def correlation(settings: Settings, found: Found, page: Page) -> None:
     static, leading = settings.of("static"), settings.of("leading")
     groups = {"static": np.concatenate([trials(static, i, len(TESTING), "read")[0] for i in range(len(TESTING))])}
     groups |= {m: np.concatenate([trials(leading, i, len(LED), "read", m)[0] for i in range(3)]) for m in SHOWN}
-    figure, axes = _figure(1, len(groups), (11, 4))
+    figure, axes = panels(1, len(groups), (11, 4))
     table = Table(
         "mean size of the correlation of hand and", ["muscles that were commanded", "muscles that never were"]
     )
@@ -205,7 +117,7 @@ def correlation(settings: Settings, found: Found, page: Page) -> None:
     page.picture(figure, "correlation", "size of the mean correlations of 27 pressures and the hand")
     page.table(table)
     muscle = int(np.flatnonzero(STILL)[0])
-    figure, axes = _figure(1, len(groups), (10, 2.8))
+    figure, axes = panels(1, len(groups), (10, 2.8))
     for ax, (name, read) in zip(axes[0], groups.items(), strict=True):
         values = np.concatenate([sliding(r, 1, len(HAND) + muscle) for r in read])
         ax.hist(values[np.isfinite(values)], np.linspace(-1, 1, 41), color=NOW, density=True)

@@ -42,6 +42,12 @@ def met_at(truth: np.ndarray) -> float:
     return float(np.argmax(near) / RATE) if near.any() else np.inf
 
 
+def gone(hand: np.ndarray, share: float) -> float:
+    """[s] when a hand (T, 3) first has gone more than that share of its way, from its first place to its last."""
+    far = np.linalg.norm(hand - hand[0], axis=1)
+    return float(np.argmax(far > share * far[-1]) / RATE)
+
+
 def correlations(read: np.ndarray) -> np.ndarray:
     """(30, 30) of Pearson, pressures first and the hand last, as in Fig. 19."""
     seen = read[np.isfinite(read).all(1)]

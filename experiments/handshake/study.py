@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from experiments.handshake import figures, tell
+from experiments.handshake import figures, phases, tell
 from experiments.handshake.demonstrations import PEOPLE, REPETITIONS, TRAINERS
 from experiments.handshake.film import SHOWN, acted
 from experiments.handshake.trajectories import TRAINING
@@ -15,12 +15,12 @@ from experiments.study import Found, Page, Part, Settings, Study, Task, task
 
 SAYS = """
 An arm of 10 joints with 27 McKibben muscles in MuJoCo, each with its force law, valve and braid friction, of which a
-model sees nothing but pressures, and a person's hand by camera at 30 Hz. Training is by response elicitation (2.4): 12
-trajectories of pressures that were made beforehand, and three partners who adapt. Tests are with those three and five
-more: four scenarios with other trajectories that do not heed anybody (static), and four in which the partner leads,
-fast, normal, slow, or not moving at all. **bip** is the dissertation's: 450 weights, noise of Eq. 2.15, inference and
-response at 3 Hz, played at 10 Hz through an alpha-beta filter. **ebip** and **rbpf** are inphase with nothing set:
-`fit`, and the live loop at its own rates.
+model sees nothing but pressures, and a person's hand by camera at 30 Hz. Training is by response elicitation (2.4):
+12 trajectories of pressures that were made beforehand, and three partners who adapt. Tests are with those three and
+five more: four scenarios with other trajectories that do not heed anybody (static), and five in which the partner
+leads, fast, normal, slow, not moving at all, or with a pause. **bip** is the dissertation's: 450 weights, noise of
+Eq. 2.15, inference and response at 3 Hz, played at 10 Hz through an alpha-beta filter. **ebip** and **rbpf** are
+inphase with nothing set: `fit`, and the live loop at its own rates.
 """
 
 
@@ -93,7 +93,7 @@ STUDY = Study(
         "static": Part("Static trajectories", _static, _quiet),
         "leading": Part("Did they shake hands?", _leading, tell.met, needs=("models", "static")),
         "completion": Part("Time-to-Completion (Table 1)", _none, tell.completion, needs=("leading", "static")),
-        "phase": Part("Phase and phase velocity (Figs. 15, 16)", _none, figures.phase, needs=("leading",)),
+        "phase": Part("Phase and phase velocity (Figs. 15, 16)", _none, phases.phase, needs=("training", "leading")),
         "prediction": Part("Predicted pressures (Fig. 17)", _none, figures.prediction, needs=("leading",)),
         "profiles": Part("Positions and velocities (Fig. 18)", _none, figures.profiles, needs=("leading", "static")),
         "correlation": Part("Correlations (Figs. 19, 20)", _none, figures.correlation, needs=("leading", "static")),
