@@ -14,6 +14,7 @@ from experiments.study import Cell, Page, Part, Settings, Stored, Study, Table
 from experiments.study.as_written import as_written
 from experiments.study.compared import pairs
 from experiments.study.conduct import conduct, load
+from experiments.study.follower import cheaper
 from experiments.study.interaction_primitive import warped
 from experiments.study.stored import digest
 from experiments.study.table import marked
@@ -113,6 +114,22 @@ def test_a_result_that_is_broken_or_of_other_settings_is_made_anew(settings, dia
     assert "3 results are of other code or settings" in said[0]
     conducted(study(diary), settings, parts=("first",), keep=True)  # as they are
     assert len(done(diary)) == 7
+
+
+@pytest.mark.parametrize("folder", ["handwriting", "study", "bodies"])
+def test_what_other_code_has_made_is_made_anew_wherever_that_code_is(settings, diary, monkeypatch, tmp_path, folder):
+    """A study's own, or what studies share; of another study it says nothing."""
+    monkeypatch.setattr("experiments.study.conduct.BESIDE", tmp_path)
+    for each in ("handwriting", "study", "bodies", "catching"):
+        (tmp_path / each).mkdir()
+        (tmp_path / each / "model.py").write_text("1")
+    conducted(study(diary), settings, parts=("first",))
+    (tmp_path / "catching" / "model.py").write_text("2")
+    conducted(study(diary), settings, parts=("first",))
+    assert len(done(diary)) == 3
+    (tmp_path / folder / "model.py").write_text("2")
+    conducted(study(diary), settings, parts=("first",))
+    assert len(done(diary)) == 6
 
 
 def test_a_part_alone_has_what_it_needs_done_and_is_told_alone(settings, diary):
@@ -318,3 +335,10 @@ def test_the_model_as_written_has_white_noise_of_the_regression_and_else_what_wa
     for each in (model, learned):
         assert (each.prior.trust, each.prior.shrinkage, each.reflex) == (1.0, 0.0, None)
         np.testing.assert_array_equal(each.prior.samples, model.prior.samples)
+
+
+def test_up_to_which_length_the_first_takes_less_time():
+    assert cheaper([10, 20, 40], np.array([1.0, 2.0, 9.0]), np.array([2.0, 3.0, 4.0])) == (
+        "; of 20 samples and less it takes more"
+    )
+    assert cheaper([10, 20], np.array([3.0, 4.0]), np.array([2.0, 3.0])) == ""

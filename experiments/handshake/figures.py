@@ -38,13 +38,14 @@ def prediction(settings: Settings, found: Found, page: Page) -> None:
     muscle = NAMES.index("biceps")
     rows = (("normal", 0), ("fast", 0), ("fast", -1))
     figure, axes = panels(3, len(SHOWN), (10, 7), sharex=True, sharey=True)
-    times = np.arange(301) / RATE
+    times, moments = np.arange(301) / RATE, []
     for j, method in enumerate(SHOWN):
         for ax, (speed, which) in zip(axes[:, j], rows, strict=True):
             i = LED.index(speed)
             read = trials(leading, i, len(LED), "read", method)[0][which]
             plans = trials(leading, i, len(LED), "responses", method)[0][which]
             made = [p for p in plans if np.isfinite(p).all()][:17]
+            moments.append(float(made[-1][0, 0]))
             for age, plan in enumerate(made[-16:-1]):
                 ax.plot(plan[:, 0], plan[:, 1 + muscle], color=COLOURS[1], lw=0.7, ls="--", alpha=0.25 + 0.03 * age)
             ax.plot(made[-1][:, 0], made[-1][:, 1 + muscle], color=NOW, lw=1.6, ls="--", label="predicted now")
@@ -65,7 +66,10 @@ def prediction(settings: Settings, found: Found, page: Page) -> None:
     page.picture(
         figure, "prediction", "predicted pressure of the biceps, earlier predictions, and the pressure as it was"
     )
-    page.say("Blue: the prediction after 5.6 s; red: the 15 before it, a third of a second apart; orange: the hand, x.")
+    page.say(
+        f"Blue: a prediction, {min(moments):.1f} to {max(moments):.1f} s after the beginning; red: the 15 before it, a "
+        "third of a second apart; orange: the hand, x."
+    )
 
 
 def profiles(settings: Settings, found: Found, page: Page) -> None:

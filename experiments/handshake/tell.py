@@ -58,7 +58,7 @@ def met(settings: Settings, found: Found, page: Page) -> None:
     static, leading = settings.of("static"), settings.of("leading")
     methods = played(leading)
     table = Table(f"share of hands within {100 * MET:.0f} cm at the end; median distance [cm]", list(methods.values()))
-    times = Table("time until then [s], of those", list(methods.values()))
+    times = Table("time until they first were [s], of those that ever were", list(methods.values()))
     shares: dict[str, list[np.ndarray]] = {method: [] for method in methods}
     for i, speed in enumerate(LED):
         cells, soon = {}, {}
@@ -113,7 +113,8 @@ def completion(settings: Settings, found: Found, page: Page) -> None:
                 rows[name].append(marks[name].format(f"{v.mean():.3f}") + f" / {v.var():.4f}")
     table = Table("Time-to-Completion", columns)
     for name, cells in rows.items():
-        theirs = THEIRS.get(name.split(", ")[-1].replace(" ", ""), ("", "", ""))
+        method, _, speed = name.rpartition(", ")
+        theirs = THEIRS[speed.replace(" ", "")] if method in ("bip", "") else ("", "", "")
         table.add(name, dict(zip(columns, cells, strict=True)), dict(zip(columns, theirs, strict=True)))
     page.table(table)
     page.say(

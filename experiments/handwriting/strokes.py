@@ -39,7 +39,7 @@ class Stroke:
 
 
 def stroke() -> np.ndarray:
-    """(100, 2) the stroke of the benchmark: one with a loop, about six wide and high."""
+    """(100, 2) the stroke of the benchmark: one with a loop, about four wide and six high."""
     phases = np.linspace(0.0, 1.0, SAMPLES)
     x = 2.5 + 3.5 * phases + 1.2 * np.sin(3 * np.pi * phases) + 0.15 * np.sin(6 * np.pi * phases)
     y = 5.5 - 2.7 * np.cos(2 * np.pi * phases) + 0.5 * np.sin(4 * np.pi * phases)

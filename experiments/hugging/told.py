@@ -41,12 +41,14 @@ def taught(settings: Settings, found: Found, page: Page) -> None:
     """How many, how long, how strong."""
     arrays = {name: value for part in found.values() for name, value in part.items()}
     numbers = [int(name.split("_")[1]) for name in arrays if name.startswith("kept_")]
-    kept = [n for n in numbers if arrays[f"kept_{n}"]][:KEPT]
+    touched = [n for n in numbers if arrays[f"kept_{n}"]]
+    kept = touched[:KEPT]
     long = np.array([arrays[f"times_{n}"][-1] for n in kept])
     held = np.array([arrays[f"hold_{n}"] for n in kept])
     page.say(
-        f"{TRAINED} people, {len(numbers)} hugs, {len(kept)} of them kept for their contact on chest and back (150 and "
-        f"121). They last {long.mean():.1f} ± {long.std():.1f} s; while held, the robot's left arm presses with "
+        f"{TRAINED} people, {len(numbers)} hugs, {len(touched)} of which touch chest and back; the first {len(kept)} "
+        f"of these are learned (the dissertation: 121 of 150). They last {long.mean():.1f} ± {long.std():.1f} s; while "
+        "held, the robot's left arm presses with "
         f"{held[:, 0].mean():.0f} ± {held[:, 0].std():.0f} N, the right one with {held[:, 1].mean():.0f} ± "
         f"{held[:, 1].std():.0f} N."
     )

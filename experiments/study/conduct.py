@@ -20,6 +20,8 @@ from inphase.workers import Team
 
 Progress = Callable[[float], None]
 BESIDE = Path(__file__).parents[1]
+SHARED = ("study", "bodies")  # by several studies
+LIBRARY = Path(inphase.__file__).parent
 
 
 def load(name: str) -> Study:
@@ -51,7 +53,7 @@ def conduct(
     progress: is told the share of the tasks that is done.
     """
     chosen = study.chosen(parts)
-    source = digest([BESIDE / name, Path(inphase.__file__).parent], settings.quick, settings.seed)
+    source = digest([*(BESIDE / folder for folder in (name, *SHARED)), LIBRARY], settings.quick, settings.seed)
     page = Page(name, settings.folder, [part.what for part in study.parts.values()])
     page.say(study.says)
     for i, (part, told) in enumerate(chosen.items()):

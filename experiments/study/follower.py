@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -65,3 +65,9 @@ def filtered(model: str, name: str) -> Method:
 def warped_in_time(model: str) -> Method:
     """Interaction Primitives with dynamic time warping."""
     return Method(model, lambda learned, seed: _Warped(learned))
+
+
+def cheaper(lengths: Sequence[int], time: np.ndarray, other: np.ndarray) -> str:
+    """Up to which length the first of two times is less, as the end of a sentence; empty where it never is."""
+    less = [length for length, a, b in zip(lengths, time, other, strict=True) if a < b]
+    return f"; of {max(less)} samples and less it takes more" if less else ""
