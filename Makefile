@@ -46,7 +46,7 @@ growth: $(VENV)/demo  ## how the cost of a step grows: the picture in docs/perfo
 page: $(VENV)/dev  ## the report of ten minutes: how large, how soon open, how smooth, in a browser
 	$(BIN)/python benchmarks/report.py $(ARGS)
 
-accuracy: $(VENV)/demo  ## how accurate the filters are on the recordings beside this folder: an hour or more
+accuracy: $(VENV)/demo  ## how accurate the filters are on the recordings beside this folder: a quarter of an hour or more
 	$(BIN)/python benchmarks/accuracy.py $(ARGS)
 
 pictures: $(VENV)/dev  ## the pictures of report and studio in docs/, made by the test that holds them true
