@@ -213,6 +213,16 @@ def test_a_partner_who_jumps_is_heard_as_soon_as_it_is_no_slip(seed: int, model:
     assert Status.UNLIKE in status[22:25]
 
 
+def test_who_wants_it_has_every_reading_taken_at_its_word(model: inphase.Model) -> None:
+    samples, _ = partner(np.arange(COUNT + 1) / COUNT, 1)
+    samples[20] += 0.5 * model.scaling.span[:2]
+    wary, plain = model.session("bip", slips=True), model.session("bip", slips=False)
+    for i, sample in enumerate(samples[:21]):
+        heard = [session.observe(i / COUNT, sample) for session in (wary, plain)]
+        assert (heard[0] == heard[1]) == (i < 20)
+    assert [estimate.status is Status.REFUSED for estimate in heard] == [True, False]
+
+
 # ------------------------------------------------------------------------------------------------------ someone else
 
 

@@ -13,15 +13,18 @@ pytest.importorskip("mujoco", reason="needs mujoco: pip install 'inphase[sim]'")
 pytest.importorskip("mink", reason="needs mink: pip install 'inphase[sim]'")
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+import inphase
 from experiments.bodies.arm import JOINTS, TORQUE, VELOCITY
 from experiments.bodies.person import SHARES, bent
 from experiments.catching import flight, motion
-from experiments.catching.demonstrations import demonstrated, thrown
+from experiments.catching.demonstrations import demonstrated, gathered, make, thrown
 from experiments.catching.expert import demonstrate, plan
+from experiments.catching.felt import imu
 from experiments.catching.sensors import KINDS, MODALITIES, OBSERVED, Watch, watches
 from experiments.catching.thrower import Throw
+from experiments.catching.trial import held_before, played, unmoved
 from experiments.catching.world import HOME, World, built
-from inphase.runtime import FakeClock, Sensor
+from inphase.runtime import FakeClock, Journal, Sensor
 
 
 @pytest.fixture(scope="module")
@@ -189,6 +192,28 @@ def test_a_sensor_that_falls_silent_says_nothing_more(caught: tuple[Throw, World
     assert 0.48 < imu.read()[-1].stamp <= 0.5
 
 
+def test_nothing_is_felt_before_it_happens(caught: tuple[Throw, World]) -> None:
+    happens, _ = caught
+    i = round(happens.release / motion.STEP)
+    later = {name: np.where(np.arange(len(p))[:, None] < i, p, p[i]) for name, p in happens.joints.items()}
+    felt = [imu(happens.style, joints) for joints in (happens.joints, later)]
+    np.testing.assert_array_equal(felt[0][: i - 3], felt[1][: i - 3])
+    assert np.abs(felt[0] - felt[1])[i + 20 :].max() > 1.0
+
+
+def test_all_that_is_drawn_for_a_throw_is_drawn_from_seeds_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A seed that ends in 0 draws what the one without it draws, so that two lists that differ may be the same."""
+    states, make = [], np.random.default_rng
+
+    def noted(seed: list[int]) -> np.random.Generator:
+        states.append(tuple(np.random.SeedSequence(seed).generate_state(4)))
+        return make(seed)
+
+    monkeypatch.setattr(np.random, "default_rng", noted)
+    demonstrated(0, 0)
+    assert len(states) == len(set(states)) >= 2 + len(KINDS)
+
+
 # ------------------------------------------------------------------------------------------------------- the expert
 
 
@@ -209,3 +234,36 @@ def test_demonstrations_are_whole_and_the_same_with_one_seed() -> None:
     assert 0.3 < one.phases[ball][0] < 0.6  # 43 % as in 3.4.1
     assert one.phases[ball][-1] > 0.95
     assert set(MODALITIES) == {"body", "imu", "shoes", "head", "ball"}
+
+
+# ----------------------------------------------------------------------------------------------------------- the loop
+
+
+def test_a_robot_that_is_held_on_the_way_is_counted() -> None:
+    """By safety, and before the ball has passed: afterwards there is nothing more to be seen."""
+    journal = Journal()
+    journal.tell(0.0, "safety", "all is well", before="HOLDING", after="RUNNING")
+    assert not held_before(2.0, journal)
+    journal.tell(1.0, "safety", "nothing is read of the partner", before="RUNNING", after="HOLDING")
+    assert held_before(1.1, journal)
+    assert not held_before(0.9, journal)
+
+
+def test_ctrl_c_ends_a_study_in_the_middle_of_a_throw(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is not taken for a wish that the robot stop, whose throw would be counted."""
+    session = inphase.fit(gathered({"some": make(0, range(3))}), calibrate=False).session()
+    go_on, presses = World.to, iter([False] * 60 + [True])
+
+    def interrupted(self: World, time: float) -> None:
+        if next(presses, False):
+            raise KeyboardInterrupt
+        go_on(self, time)
+
+    monkeypatch.setattr(World, "to", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        played(session, 0, "ball alone", 0)
+
+
+def test_a_robot_that_never_moves_catches_what_falls_into_its_box() -> None:
+    caught = unmoved(range(12), 0)["caught"]
+    assert 0 < caught.sum() < 12

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+from scipy.signal import sosfilt, sosfilt_zi
 from scipy.spatial.transform import Rotation
 
 from experiments.bodies.person import SHARES
@@ -63,8 +63,13 @@ def imu(who: Style, joints: Mapping[str, np.ndarray]) -> np.ndarray:
     return np.concatenate([np.einsum("tij,ti->tj", frames, pushed), turning], axis=1)
 
 
-def _smooth(values: np.ndarray, std: float) -> np.ndarray:
-    return np.asarray(gaussian_filter1d(values, std / STEP, axis=0, mode="nearest"))
+def _smooth(values: np.ndarray, span: float) -> np.ndarray:
+    """As something soft follows them, about so late [s] and never early: critically damped."""
+    follows = 1 - np.exp(-2 * STEP / span)
+    sections = np.tile([follows, 0.0, 0.0, 1.0, follows - 1.0, 0.0], (2, 1))
+    begun = sosfilt_zi(sections)[..., None] * values[0].ravel()
+    smooth, _ = sosfilt(sections, values.reshape(len(values), -1), axis=0, zi=begun)
+    return np.asarray(smooth.reshape(values.shape))
 
 
 def _unit(rows: np.ndarray) -> np.ndarray:

@@ -42,12 +42,9 @@ def methods(train: inphase.Dataset, calibrate: bool) -> Methods:
     """The dissertation's methods on its own model, with as many members as demonstrations, and ours on `fit`."""
     written = as_written(train, chosen_basis(train))
     ours = inphase.fit(train, calibrate=calibrate)
-    every = len(train)
     return {
-        "BIP": (written, {"filter": "bip"}),
-        "PF": (written, {"filter": "particle", "particles": every}),
-        "eBIP-": (written, {"filter": "ebip", "members": every, "prior": "mixture"}),
-        "eBIP": (written, {"filter": "ebip", "members": every}),
+        "BIP": (written, {"filter": "bip", "slips": False}),
+        **_ensembles(written, len(train)),
         "eBIP, calibrated": (ours, {"filter": "ebip"}),
         "rbpf": (ours, {}),
     }
@@ -55,11 +52,15 @@ def methods(train: inphase.Dataset, calibrate: bool) -> Methods:
 
 def learned_noise(train: inphase.Dataset) -> Methods:
     """The dissertation's ensembles and particles, on its own model but for the noise, which is learned."""
-    model, every = as_written(train, chosen_basis(train), white=False), len(train)
+    return _ensembles(as_written(train, chosen_basis(train), white=False), len(train))
+
+
+def _ensembles(model: inphase.Model, members: int) -> Methods:
+    """Particles, and ensembles of either prior; every reading is taken at its word, as in the dissertation."""
     return {
-        "PF": (model, {"filter": "particle", "particles": every}),
-        "eBIP-": (model, {"filter": "ebip", "members": every, "prior": "mixture"}),
-        "eBIP": (model, {"filter": "ebip", "members": every}),
+        "PF": (model, {"filter": "particle", "particles": members, "slips": False}),
+        "eBIP-": (model, {"filter": "ebip", "members": members, "prior": "mixture", "slips": False}),
+        "eBIP": (model, {"filter": "ebip", "members": members, "slips": False}),
     }
 
 

@@ -169,5 +169,7 @@ def _quaternion(yaw: float, pitch: float, roll: float) -> np.ndarray:
 
 
 def watches(world: World, seed: list[int], **options: dict[str, float]) -> list[Watch]:
-    """All five. options: by modality."""
-    return [Watch(n, world, np.random.default_rng([*seed, i]), **options.get(n, {})) for i, n in enumerate(MODALITIES)]
+    """All five. options: by modality. Each has a seed of its own: [*seed, 0] draws the same as seed alone."""
+    return [
+        Watch(n, world, np.random.default_rng([*seed, 1 + i]), **options.get(n, {})) for i, n in enumerate(MODALITIES)
+    ]

@@ -11,7 +11,7 @@ from experiments.catching.demonstrations import make
 from experiments.catching.film import filmed
 from experiments.catching.prediction import Methods, cross_validated, learned_noise, methods
 from experiments.catching.trade_off import by_members
-from experiments.catching.trial import CONDITIONS
+from experiments.catching.trial import CONDITIONS, unmoved
 from experiments.study import Part, Settings, Study, Task, task
 from inphase import Dataset
 
@@ -63,6 +63,8 @@ def _catching(settings: Settings) -> dict[str, Task]:
         for begin in range(0, throws, chunk):
             numbers = range(begin, begin + chunk)
             tasks[f"{i}/from-{begin:03d}"] = task(in_the_loop, models, condition, numbers, settings.seed)
+    for begin in range(0, throws, chunk):
+        tasks[f"unmoved/from-{begin:03d}"] = task(unmoved, range(begin, begin + chunk), settings.seed)
     if not settings.quick:
         for begin in range(0, throws // 2, chunk):
             tasks[f"strangers/from-{begin:03d}"] = task(strangers, models, range(begin, begin + chunk), settings.seed)

@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from experiments.catching import figures
-from experiments.catching.demonstrations import PERSONS
+from experiments.catching.demonstrations import PERSONS, gathered
 from experiments.catching.prediction import COLUMNS, COURSE, MARKS, joined, trained_on
 from experiments.catching.trial import CONDITIONS
 from experiments.study import Cell, Found, Page, Settings, Table
+from inphase import Dataset
 
 SAYS = """
 A person throws a ball underhand at an arm of the UR5 class, 3.7 m away, that holds a box, 32 cm wide. Hands and feet,
@@ -64,6 +65,8 @@ def prediction(settings: Settings, found: Found, page: Page) -> None:
         "a session takes when no filter is named. One model of all modalities serves all rows: what a row does not "
         "name is not observed."
     )
+    early, count = _seen_by(MARKS[0], gathered(settings.of("demonstrations")))
+    page.say(f"At {MARKS[0]:.0%} the ball has been seen in {early} of {count} throws, at {MARKS[1]:.0%} in all.")
     told = {"joints": JOINTS_TOLD, "ball": BALL_TOLD}
     for what in COLUMNS_OF:
         _errors(page, found, what, METHODS, told[what])
@@ -71,6 +74,13 @@ def prediction(settings: Settings, found: Found, page: Page) -> None:
     page.picture(figures.course(COURSE, course), "ball", "Error of the ball at the catch, foreseen over the phase")
     theirs = joined(found, "joints/All/rbpf")[:, 1].mean() / joined(found, "joints/All/eBIP")[:, 1].mean()
     page.say(f"At 82 % with all modalities, `rbpf` has {theirs:.2f} times the joint error of eBIP as written.")
+
+
+def _seen_by(mark: float, dataset: Dataset) -> tuple[int, int]:
+    """In how many demonstrations the ball was seen before that phase, and of how many."""
+    ball = dataset.names.index("ball_x")
+    seen = [d.phases[np.isfinite(d.values[:, ball])][0] < mark for d in dataset]
+    return sum(seen), len(seen)
 
 
 def noise(settings: Settings, found: Found, page: Page) -> None:
@@ -143,6 +153,8 @@ def catching(settings: Settings, found: Found, page: Page) -> None:
             },
         )
     page.table(table)
+    still = joined({label: part for label, part in found.items() if label.startswith("unmoved/")}, "caught")
+    page.say(f"A robot that never moves catches {still.mean():.0%} of {len(still)}, in the box where it waits.")
     page.say(
         "New throws, the robot led by the live loop at 60 Hz with the loop's own devices, safety and limits, by the "
         "simulator's clock. In reach: whoever knows the throw beforehand catches it. Box off: the median of how near "

@@ -25,7 +25,7 @@ def by_members(found: Found, members: int, folds: int, seed: int, tests: int) ->
     observed = channels_of(*COLUMNS["All"])
     result: dict[str, Any] = {"members": members}
     for name, prior in (("eBIP", "demonstrations"), ("eBIP-", "mixture")):
-        session = model.session(filter="ebip", members=members, prior=prior, seed=seed)
+        session = model.session(filter="ebip", members=members, prior=prior, seed=seed, slips=False)
         errors, steps, wholes = [], [], []
         for demonstration in list(test)[:tests]:
             session.reset()

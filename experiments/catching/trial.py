@@ -15,6 +15,7 @@ from experiments.catching.flight import crossing
 from experiments.catching.sensors import MODALITIES, watches
 from experiments.catching.thrower import AIM_AT, Throw
 from experiments.catching.world import World
+from experiments.study.leading import lead
 from inphase.runtime import (
     Clock,
     Command,
@@ -28,10 +29,11 @@ from inphase.runtime import (
     Sample,
     Sight,
     Signal,
+    State,
 )
 
 RATE = 60.0  # [1/s] of all that the loop does, as in 3.4.1
-SETTLES = 0.5  # [s] after which a ball that is in the box stays there
+FALLS, SETTLES = 1.7, 0.5  # [s] after its release a ball lies somewhere, and stays there
 ACCELERATION = 60.0  # [rad/s²] the loop may ask of a joint
 LATEST = 0.03  # [s] the slowest sensor's readings are late
 REACH = 2 * np.pi
@@ -75,8 +77,8 @@ class Outcome:
     """What came of a throw.
 
     caught: whether the ball was in the box in the end. reachable: whether who knows the throw would catch it. missed:
-    [m] from the ball to the middle of the opening, at the nearest. phase: where the loop believed to be then. states:
-    why the loop's states changed.
+    [m] from the ball to the middle of the opening, at the nearest. phase: where the loop believed to be then. held:
+    whether safety held the robot before that.
     """
 
     world: World
@@ -84,7 +86,7 @@ class Outcome:
     reachable: bool
     missed: float
     phase: float
-    states: list[str]
+    held: bool
 
 
 def options(condition: str, throw: Throw) -> dict[str, dict[str, float]]:
@@ -93,9 +95,7 @@ def options(condition: str, throw: Throw) -> dict[str, dict[str, float]]:
     if condition == "shoes and IMU lost in mid-throw":
         chosen = {name: {"silent": LOST_AT * throw.release} for name in chosen}
     if "hidden" in chosen.get("ball", {}):
-        came = crossing(throw.position, throw.velocity, lambda place: float(place[0]) - AIM_AT)
-        flight = 1.0 if came is None else came[0]
-        chosen["ball"]["hidden"] = throw.release + chosen["ball"]["hidden"] * flight
+        chosen["ball"]["hidden"] = throw.release + chosen["ball"]["hidden"] * passes(throw)
     return chosen
 
 
@@ -121,7 +121,7 @@ def played(
     )
     session.reset(number)
     session.observe(0.0, np.full(len(session.model.observed), np.nan))  # the interaction begins, seen or not
-    falls = happens.release + 1.7
+    falls = happens.release + FALLS
     phase = [0.0]
 
     def look() -> None:
@@ -133,13 +133,35 @@ def played(
         clock.at(clock.now() + 1 / RATE, look)
 
     clock.at(0.0, look)
-    loop.run(falls, watch=False)
+    lead(loop, clock, falls)
     clock.wait_until(max(falls, (world.entered or 0.0) + SETTLES))
     world.to(clock.now())
     planned = plan(happens, rng)
     reachable = planned is not None and demonstrate(happens, planned).inside
-    states = [event.reason for event in journal.events if event.kind == "safety"]
-    return Outcome(world, world.inside, reachable, world.nearest, phase[0], states)
+    held = held_before(world.entered or happens.release + passes(happens), journal)
+    return Outcome(world, world.inside, reachable, world.nearest, phase[0], held)
+
+
+def held_before(time: float, journal: Journal) -> bool:
+    """Whether safety held the robot before that time [s]."""
+    return any(e.kind == "safety" and e.after == State.HOLDING.name and e.time < time for e in journal.events)
+
+
+def passes(happens: Throw) -> float:
+    """[s] from its release until the ball comes to where the robot catches."""
+    came = crossing(happens.position, happens.velocity, lambda place: float(place[0]) - AIM_AT)
+    return 1.0 if came is None else came[0]
+
+
+def unmoved(numbers: range, seed: int) -> dict[str, Any]:
+    """The same throws at a robot that never moves: how many balls fall into the box where it waits."""
+    caught = []
+    for number in numbers:
+        happens, _ = thrown(seed, number, TESTED)
+        world = World(happens)
+        world.to(happens.release + FALLS + SETTLES)
+        caught.append(world.inside)
+    return {"caught": np.array(caught)}
 
 
 def tried(model: inphase.Model, condition: str, numbers: range, seed: int, purpose: int = TESTED) -> dict[str, Any]:
@@ -151,5 +173,5 @@ def tried(model: inphase.Model, condition: str, numbers: range, seed: int, purpo
         "reachable": np.array([o.reachable for o in outcomes]),
         "missed": np.array([o.missed for o in outcomes]),
         "phase": np.array([o.phase for o in outcomes]),
-        "held": np.array([sum("HOLD" in s for s in o.states) for o in outcomes]),
+        "held": np.array([o.held for o in outcomes]),
     }

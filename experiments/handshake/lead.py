@@ -10,6 +10,7 @@ import inphase
 from experiments.handshake.anatomy import MUSCLES
 from experiments.handshake.encounter import LASTS, Encounter
 from experiments.handshake.sensors import HAND, PRESSURES
+from experiments.study.leading import lead
 from inphase.runtime.clock import Clock
 from inphase.runtime.conduct import Conduct
 from inphase.runtime.device import Command, Sample, Signal
@@ -101,16 +102,7 @@ def live(encounter: Encounter, session: Session) -> Led:
         journal=notes,
         shared_clock=["camera"],
     )
-    # Not `run`: Ctrl-C is to end the study, not to bring a robot to rest.
-    loop.begin()
-    try:
-        while not loop.over and loop.due < LASTS:
-            clock.wait_until(loop.due)
-            loop.cycle()
-    finally:
-        loop.end()
-    if loop.actuation.guard.failure is not None:
-        raise loop.actuation.guard.failure
+    lead(loop, clock, LASTS)
     encounter.until(LASTS)
     return notes.led
 

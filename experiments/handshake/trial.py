@@ -49,7 +49,7 @@ def led(
     look, world: of a film, as for `Encounter`.
     """
     encounter = Encounter(*who, look=look, model=world)
-    session = model.session(filter=method, seed=seed)
+    session = model.session(filter=method, seed=seed, slips=method != "bip")
     found = (as_written if method == "bip" else live)(encounter, session)
     return encounter.told, found
 

@@ -47,7 +47,8 @@ def cross_validated(
         ours = None
         for name, filter in methods.items():
             if name == "as written":
-                model, options = as_written(shown.dataset, shown.bases or UNIFORM), {"members": len(train)}
+                model = as_written(shown.dataset, shown.bases or UNIFORM)
+                options: dict[str, Any] = {"members": len(train), "slips": False}
             else:
                 ours = ours or inphase.fit(shown.dataset, basis=shown.bases, calibrate=False)
                 model, options = ours, {}

@@ -17,8 +17,10 @@ from inphase.training.noise import regression_noise
 def as_written(dataset: inphase.Dataset, basis: Basis | Mapping[str, Basis], *, white: bool = True) -> inphase.Model:
     """Weights as the demonstrations have them, their sample covariance, and white noise of the regression (Eq. 2.15).
 
-    No shrinkage, no trust less than whole, no reflex, nothing held out: what chapters 2 and 3 compare. white: False for
-    the noise that `inphase.fit` learns, and all else as written, to see what the noise does.
+    No shrinkage, no trust less than whole, no reflex, nothing held out: what chapters 2 and 3 compare, where filters
+    take every reading at its word, too (`slips=False`). The spread of the tempo alone is the library's, at least a
+    fifth: demonstrations that were cut to one length have none. white: False for the noise that `inphase.fit` learns,
+    and all else as written, to see what the noise does.
     """
     model = inphase.fit(dataset, basis=basis, shrinkage=0.0, calibrate=False)
     written = replace(model, prior=replace(model.prior, trust=1.0), reflex=None)

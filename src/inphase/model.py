@@ -164,14 +164,16 @@ class Model:
 
     # The doors upward (docs/decisions/0001-doors.md): what a user looks for on a model, wherever it lives.
 
-    def session(self, filter: str | None = None, seed: int = 0, **options: Any) -> Session:
+    def session(self, filter: str | None = None, seed: int = 0, *, slips: bool = True, **options: Any) -> Session:
         """A session that follows one interaction live; `options` are those of the filter, None the recommended one.
 
+        slips: whether a reading that surprises is held back for a moment, as it may be a slip of the sensor; False
+        takes every reading at its word.
         Raises OptionError for an unknown filter or option.
         """
         from inphase.session import Session
 
-        return Session(self, filter, seed, **options)
+        return Session(self, filter, seed, slips=slips, **options)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the model to one file, whole or not at all."""

@@ -39,8 +39,11 @@ class Session:
     bit. Mistakes raise; trouble is told by the status of the estimate.
     """
 
-    def __init__(self, model: Model, filter: str | None = None, seed: int = 0, **options: Any) -> None:
+    def __init__(
+        self, model: Model, filter: str | None = None, seed: int = 0, *, slips: bool = True, **options: Any
+    ) -> None:
         self.model = model
+        self._wary = slips
         self._filter = make(RECOMMENDED if filter is None else filter, model, **options)
         self._seed = seed
         self._index = {name: i for i, name in enumerate(model.names)}
@@ -199,8 +202,8 @@ class Session:
         self, features: Int[np.ndarray, " M"], values: Float[np.ndarray, " M"], time: float, dt: float
     ) -> Bool[np.ndarray, " M"]:
         """Readings to wait with: who surprises for a moment is the sensor, who goes on surprising is the partner."""
-        if len(features) == 0:
-            return np.zeros(0, dtype=bool)
+        if len(features) == 0 or not self._wary:
+            return np.zeros(len(features), dtype=bool)
         ahead = Course(np.ones(1), np.array([self._velocity()[0] * dt]))
         surprising = self._distances(ahead, features, values) > SURPRISING
         begins = surprising & (time - self._surprised[features] > NEXT_SLIP * self._typical_duration)
