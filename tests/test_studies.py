@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import zipfile
+from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
 
@@ -20,7 +22,7 @@ from experiments.study.stored import digest
 from experiments.study.table import marked
 from inphase.basis import Gaussian
 from inphase.errors import DataError, OptionError
-from inphase.workers import workers
+from inphase.workers import Team, workers
 
 ROOT = Path(__file__).parents[1]
 
@@ -112,8 +114,80 @@ def test_a_result_that_is_broken_or_of_other_settings_is_made_anew(settings, dia
     _, said = conducted(study(diary), other, parts=("first",))
     assert done(diary)[4:] == ["a", "b/1", "b/2"]
     assert "3 results are of other code or settings" in said[0]
-    conducted(study(diary), settings, parts=("first",), keep=True)  # as they are
-    assert len(done(diary)) == 7
+    conducted(study(diary), settings, parts=("first",), keep=True)  # of another seed, whatever the code
+    assert len(done(diary)) == 10
+
+
+def test_results_of_other_code_are_kept_if_that_is_wanted(settings, diary, monkeypatch, tmp_path):
+    conducted(study(diary), settings)
+    monkeypatch.setattr("experiments.study.conduct.BESIDE", tmp_path)
+    _, said = conducted(study(diary), settings, keep=True)
+    assert (len(done(diary)), said) == (3, [])
+    conducted(study(diary), settings)
+    assert len(done(diary)) == 6
+
+
+def test_what_an_earlier_study_left_is_not_among_the_results(settings, diary):
+    """Else a demonstration of fewer, larger tasks would be learned twice, and tested on what was learned."""
+    conducted(study(diary, labels=("a", "b/1", "b/2", "b/3")), settings, parts=("first",))
+    text, _ = conducted(study(diary), settings, parts=("first", "second"))
+    assert '"b/3"' not in text
+    assert text.endswith("\n\n3")
+    stored = Stored(settings.folder / "first", ("a", "b/1"))
+    assert list(stored) == ["a", "b/1"]
+    with pytest.raises(KeyError):
+        stored["b/3"]
+
+
+def test_a_result_in_which_a_bit_is_turned_is_made_anew(settings, diary):
+    conducted(study(diary), settings)
+    path = settings.of("first").path("a")
+    content = bytearray(path.read_bytes())
+    with zipfile.ZipFile(path) as file:
+        begins = file.getinfo("numbers.npy").header_offset
+    name, extra = (int.from_bytes(content[begins + i : begins + i + 2], "little") for i in (26, 28))
+    content[begins + 30 + name + extra + 20] ^= 0x10  # in the middle of what is packed there
+    path.write_bytes(bytes(content))
+    conducted(study(diary), settings)
+    assert done(diary)[3:] == ["a"]
+
+
+def test_what_was_done_beside_a_task_that_fails_is_kept(settings, diary):
+    def fail() -> dict[str, object]:
+        raise ValueError("a task that fails")
+
+    good = tuple("abcdefghijkl")
+    made = study(diary, labels=good)
+    tasks = {"fails": fail} | dict(made.parts["first"].tasks(settings))
+    made = Study("A study", "", {"first": Part("First", lambda settings: tasks, made.parts["first"].tell)}, modules=())
+
+    def start(task):
+        future: Future[object] = Future()
+        try:
+            future.set_result(task())
+        except ValueError as error:
+            future.set_exception(error)
+        return future
+
+    with pytest.raises(ValueError, match="a task that fails"):
+        conduct("handwriting", made, settings, Team(start, lambda: 20), say=lambda text: None)
+    assert tuple(settings.of("first")) == good
+
+
+def test_commands_on_a_page_name_the_seed_that_makes_it(settings, diary):
+    text, _ = conducted(study(diary), Settings(quick=False, seed=3, folder=settings.folder))
+    assert text.count("--part first --seed 3`") == 1
+    assert "--seed" not in conducted(study(diary), settings)[0]
+
+
+def test_a_study_says_what_has_to_be_installed(monkeypatch, tmp_path):
+    """Whether it says so itself, or cannot even be read."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr("experiments.__path__", [str(tmp_path)])
+    (tmp_path / "absent").mkdir()
+    (tmp_path / "absent" / "study.py").write_text("import no_such_physics\n")
+    with pytest.raises(OptionError, match=r"absent needs no_such_physics: pip install 'inphase\[sim,demo\]'"):
+        load("absent")
 
 
 @pytest.mark.parametrize("folder", ["handwriting", "study", "bodies"])

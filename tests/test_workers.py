@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.metadata
 import os
 import re
@@ -120,6 +121,15 @@ def test_closures_go_to_the_workers(demos, cluster):
         for place in places(cluster)
     ]
     assert rows == [rows[0]] * 3
+
+
+def test_workers_of_a_cluster_find_modules_where_they_are_told_to(cluster, tmp_path, monkeypatch):
+    """As those of the studies, which are not installed; this process finds them by itself."""
+    (tmp_path / "far_from_here.py").write_text("def there(x):\n    return 2 * x\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    there = importlib.import_module("far_from_here").there
+    with workers(cluster=cluster, modules=tmp_path) as team:
+        assert team.run(there, [(1,), (2,)]) == [2, 4]
 
 
 def test_a_calibration_on_a_cluster_is_that_of_one_process(demos, cluster, monkeypatch):

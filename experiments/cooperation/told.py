@@ -37,11 +37,12 @@ def demonstrations(settings: Settings, found: Found, page: Page) -> None:
     for place in PLACES:
         runs = [found[label] for label in found if label.startswith(f"{place}/")]
         times = [run[name][-1] for run in runs for name in run if name.startswith("times")]
-        done = [bool(run[name]) for run in runs for name in run if name.startswith("done")]
+        failed = sum(int(run[name]) for run in runs for name in run if name.startswith("tried"))
         hid = np.mean([run[name].mean() for run in runs for name in run if name.startswith("hid")])
         page.say(
-            f"{TITLES[place]}: {sum(done)} of {len(done)} demonstrations ended as they were to, {np.min(times):.1f} to "
-            f"{np.max(times):.1f} s long; {100 * hid:.0f} % of the skeleton's joints were hidden from the camera."
+            f"{TITLES[place]}: {len(times)} demonstrations, {np.min(times):.1f} to {np.max(times):.1f} s long; {failed}"
+            f" that did not end as they were to were made anew. {100 * hid:.0f} % of the skeleton's joints were hidden "
+            "from the camera."
         )
 
 

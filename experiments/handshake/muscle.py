@@ -17,6 +17,7 @@ FRICTION = 0.06  # of the braid, of the force the pressure gives at rest length
 PRESLIDE = 0.002  # [m] within which the friction turns round
 DEAD = 3e-5  # [m³] of the tube to the valve
 CONDUCTANCE = 3.0e-4  # [m³/s] of an open valve, at sonic flow
+STRETCHED = 0.999  # of the length of its threads, which is as long as a muscle gets
 SPOOL, BACKLASH = 0.02, 0.02  # [s] lag of the valve, share of its way within which nothing flows
 P_GAIN, I_GAIN = 4.0, 5.0  # of the controller [1/MPa], [1/MPa s]; its D is 0
 
@@ -39,7 +40,8 @@ class Muscles:
 
     def volume(self, contraction: np.ndarray) -> np.ndarray:
         """[m³] of a cylinder whose braid keeps the length of its threads; p dV is the work of `pull`."""
-        short, cos = 1 - contraction, np.cos(BRAID)
+        cos = np.cos(BRAID)
+        short = np.minimum(1 - contraction, STRETCHED / cos)  # threads that lie along the muscle leave no room
         return self.area * self.length * short * (1 - (short * cos) ** 2) / np.sin(BRAID) ** 2
 
 

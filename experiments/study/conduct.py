@@ -7,12 +7,13 @@ import importlib.util
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import inphase
-from experiments.study.page import Page
+from experiments.study.page import Page, place  # noqa: F401 - `inphase experiment` asks whether there is one
 from experiments.study.plan import Settings, Study, Task
 from experiments.study.stored import SECONDS, digest
 from inphase.errors import OptionError
@@ -26,8 +27,13 @@ LIBRARY = Path(inphase.__file__).parent
 
 def load(name: str) -> Study:
     """A study by the name of its folder. Raises OptionError where a module that it needs is not installed."""
-    study: Study = importlib.import_module(f"experiments.{name}.study").STUDY
-    missing = [module for module in study.modules if importlib.util.find_spec(module) is None]
+    try:
+        study: Study = importlib.import_module(f"experiments.{name}.study").STUDY
+        missing = [module for module in study.modules if importlib.util.find_spec(module) is None]
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.startswith(("experiments", "inphase")):
+            raise
+        missing = [error.name]
     if missing:
         raise OptionError(
             f"{name} needs {' and '.join(missing)}: pip install 'inphase[sim,demo]', with Python 3.11 or newer"
@@ -49,11 +55,14 @@ def conduct(
 ) -> Page:
     """Do what is not done yet, and tell all of it.
 
-    parts: their names; none for all. again: do all anew. keep: take also what another state of the code has made.
+    parts: their names; none for all. again: do all anew. keep: take also what another state of the code has made, with
+    the same settings.
     progress: is told the share of the tasks that is done.
     """
     chosen = study.chosen(parts)
-    source = digest([*(BESIDE / folder for folder in (name, *SHARED)), LIBRARY], settings.quick, settings.seed)
+    code = digest([*(BESIDE / folder for folder in (name, *SHARED)), LIBRARY])
+    source = f"{code}-{digest([], settings.quick, settings.seed)}"
+    seed = f" --seed {settings.seed}" if settings.seed else ""
     page = Page(name, settings.folder, [part.what for part in study.parts.values()])
     page.say(study.says)
     for i, (part, told) in enumerate(chosen.items()):
@@ -63,11 +72,12 @@ def conduct(
                 progress((before + done) / len(chosen))
 
         tasks = study.parts[part].tasks(settings)
+        settings = replace(settings, labels={**settings.labels, part: tuple(tasks)})
         _work(tasks, settings, part, source, team, again, keep, share, say)
         if told:
             stored = settings.of(part)
             found = {label: stored[label] for label in tasks}
-            page.head(study.parts[part].what, f"inphase experiment {name} --part {part}", _minutes(found))
+            page.head(study.parts[part].what, f"inphase experiment {name} --part {part}{seed}", _minutes(found))
             study.parts[part].tell(settings, found, page)
     page.write(study.title)
     return page
@@ -87,10 +97,16 @@ def _work(
     """Have the tasks done whose results are not there."""
     stored = settings.of(part)
     made_by = {label: stored.made_by(label) for label in tasks}
-    there = [label for label, made in made_by.items() if made is not None and (keep or made == source) and not again]
+    drawn = source.partition("-")[2]
+    there = [
+        label
+        for label, made in made_by.items()
+        if made is not None and not again and (made == source or (keep and made.endswith(f"-{drawn}")))
+    ]
     stale = sum(made is not None for made in made_by.values()) - len(there)
     if stale and not again:
-        say(f"{part}: {stale} results are of other code or settings, and are made anew (--keep takes them)")
+        taken = "" if keep else " (--keep takes those of other code)"
+        say(f"{part}: {stale} results are of other code or settings, and are made anew{taken}")
     waiting = deque((label, partial(_timed, task)) for label, task in tasks.items() if label not in there)
     if there and waiting:
         say(f"{part}: {len(there)} of {len(tasks)} results are there")

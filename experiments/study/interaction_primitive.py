@@ -15,8 +15,8 @@ class InteractionPrimitive:
 
     The reference is that of the weights conditioned last. Samples are aligned by dynamic time warping from the
     beginning to wherever the last one fits best; then the prior is conditioned on all of them, each at its own phase
-    (Eq. 2.7 without a phase in the state). Between two searches the phase moves on at the tempo so far. For linear
-    channels.
+    (Eqs. 2.7 to 2.9 without a phase in the state). Between two searches the phase moves on at the tempo so far. For
+    linear channels.
     """
 
     def __init__(self, model: inphase.Model) -> None:

@@ -81,12 +81,7 @@ class Page:
 
         Parts that are not told here stay as they are there. Raises DataError where it has no such place.
         """
-        begin, end = (f"<!-- {word} {self.name} -->" for word in ("begin", "end"))
-        if not page.is_file():
-            raise OptionError(f"expected a page of Markdown, got {page}, which does not exist")
-        text = page.read_text(encoding="utf-8")
-        if not 0 <= text.find(begin) < text.find(end):
-            raise DataError(f"{page}: expected the lines {begin!r} and {end!r}, got none")
+        text, begin, end = place(page, self.name)
         before, there = text.split(begin, 1)
         there, after = there.split(end, 1)
         told = _by_head(there) | _by_head(self.text())
@@ -97,6 +92,20 @@ class Page:
             shutil.copyfile(self.folder / name, folder / name)
         with whole_file(page) as temporary:
             temporary.write_text(f"{before}{begin}\n{section}\n{end}{after}", encoding="utf-8")
+
+
+def place(page: Path, name: str) -> tuple[str, str, str]:
+    """The text of a page, and the lines between which that study has its place there.
+
+    Raises OptionError where there is no such page, DataError where the study has no place in it.
+    """
+    begin, end = (f"<!-- {word} {name} -->" for word in ("begin", "end"))
+    if not page.is_file():
+        raise OptionError(f"expected a page of Markdown, got {page}, which does not exist")
+    text = page.read_text(encoding="utf-8")
+    if not 0 <= text.find(begin) < text.find(end):
+        raise DataError(f"{page}: expected the lines {begin!r} and {end!r}, got none")
+    return text, begin, end
 
 
 def _by_head(text: str) -> dict[str, str]:

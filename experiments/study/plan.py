@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -18,15 +18,16 @@ task = partial  # so that a table of tasks reads well: task(play, fold=3)
 
 @dataclass(frozen=True)
 class Settings:
-    """How a study is conducted. folder: where its results are."""
+    """How a study is conducted. folder: where its results are. labels: of the tasks of the parts so far."""
 
     quick: bool
     seed: int
     folder: Path
+    labels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def of(self, part: str) -> Stored:
         """The results of another part, which a task may be given: they are read when asked for."""
-        return Stored(self.folder / part)
+        return Stored(self.folder / part, self.labels.get(part))
 
 
 @dataclass(frozen=True)

@@ -23,19 +23,25 @@ LABEL = re.compile(r"\w[\w.+-]*(/\w[\w.+-]*)*")
 
 @dataclass(frozen=True)
 class Stored(Mapping[str, Arrays]):
-    """The results of one part by label, read from its folder when asked for."""
+    """The results of one part by label, read from its folder when asked for.
+
+    labels: of its tasks, where these are known: other files in the folder, as an earlier or a quicker study left them,
+    are not among its results.
+    """
 
     folder: Path
+    labels: tuple[str, ...] | None = None
 
     def __getitem__(self, label: str) -> Arrays:
         path = self.path(label)
-        if not path.is_file():
+        if not path.is_file() or (self.labels is not None and label not in self.labels):
             raise KeyError(label)
         with np.load(path, allow_pickle=False) as file:
             return {name: file[name] for name in file.files}
 
     def __iter__(self) -> Iterator[str]:
-        return (str(p.relative_to(self.folder))[: -len(".npz")] for p in sorted(self.folder.rglob("[!.]*.npz")))
+        there = (str(p.relative_to(self.folder))[: -len(".npz")] for p in sorted(self.folder.rglob("[!.]*.npz")))
+        return (label for label in there if self.labels is None or label in self.labels)
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
@@ -58,9 +64,12 @@ class Stored(Mapping[str, Arrays]):
             np.savez_compressed(file, allow_pickle=False, **arrays)
 
     def made_by(self, label: str) -> str | None:
-        """The digest of what made a result; None where it is not there, or cannot be read."""
+        """The digest of what made a result; None where it is not there, or cannot be read whole."""
         try:
-            with self.path(label).open("rb") as opened, np.load(opened, allow_pickle=False) as file:
+            with zipfile.ZipFile(self.path(label)) as archive:
+                if archive.testzip() is not None:
+                    return None
+            with np.load(self.path(label), allow_pickle=False) as file:
                 return str(file[MADE_BY])
         except (OSError, KeyError, ValueError, EOFError, zlib.error, zipfile.BadZipFile):
             return None

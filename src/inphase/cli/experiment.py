@@ -45,7 +45,7 @@ def experiment(
         seed: of all that is drawn
         output: the folder for results, pictures and the page; otherwise inphase-studies/NAME or NAME-quick
         again: do all of it anew
-        keep: take results that are there also where the code has changed since
+        keep: take results of this seed that are there also where the code has changed since
         page: put what is told into this page of Markdown, where the study has its place; other parts stay
     """
     root = _root()
@@ -59,10 +59,12 @@ def experiment(
     sys.path.insert(0, str(root))  # processes that work find the studies as this one does
     studying = importlib.import_module("experiments.study.conduct")
     study = studying.load(name)
-    folder = output or Path("inphase-studies") / (f"{name}-quick" if quick else name)
+    if page is not None:
+        studying.place(page, name)  # told before the long work
+    folder = (output or Path("inphase-studies") / (f"{name}-quick" if quick else name)).resolve()
     settings = studying.Settings(quick=quick, seed=seed, folder=folder)
     console = Output()
-    with jobs.opened() as options, workers(**options) as team, working(study.title) as progress:
+    with jobs.opened() as options, workers(**options, modules=root) as team, working(study.title) as progress:
         found = studying.conduct(
             name, study, settings, team, parts=part, again=again, keep=keep, progress=progress, say=console.print
         )

@@ -55,7 +55,7 @@ def replay(
         check_picture(picture)
         check_target(picture)
     trained = Model.load(model)
-    sizes = {"members": members, "particles": particles}
+    sizes: dict[str, Any] = {"members": members, "particles": particles}
     session = trained.session(filter, seed, **{name: size for name, size in sizes.items() if size is not None})
     demonstrations = fitting(trained, Columns(format.time, format.delimiter, format.ignore_notes).load(recordings))
     console, step_by_step = Output(quiet=json_), Output(quiet=json_ or len(demonstrations) > 1)

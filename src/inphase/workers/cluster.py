@@ -7,10 +7,13 @@ import importlib.metadata
 import re
 import signal
 import socket
+import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Future
 from contextlib import contextmanager
+from functools import partial
 from logging import CRITICAL
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -40,11 +43,14 @@ def check_address(address: str) -> None:
 
 
 @contextmanager
-def connected(address: str) -> Iterator[tuple[Callable[..., Future[Any]], Callable[[], int]]]:
+def connected(
+    address: str, modules: Path | None = None
+) -> Iterator[tuple[Callable[..., Future[Any]], Callable[[], int]]]:
     """What submits work to a cluster, and what counts the threads of its workers.
 
-    The work of a worker that dies is given to another. Raises OptionError where none answers, the cluster has no
-    workers or theirs is another inphase, and WorkerError for a cluster that is lost, or work that kills its workers.
+    modules: a folder where workers look for modules, too; those who come later as well. The work of a worker that dies
+    is given to another. Raises OptionError where none answers, the cluster has no workers or theirs is another inphase,
+    and WorkerError for a cluster that is lost, or work that kills its workers.
     """
     check_address(address)
     from distributed import Client, KilledWorker
@@ -57,6 +63,8 @@ def connected(address: str) -> Iterator[tuple[Callable[..., Future[Any]], Callab
             raise OptionError(f"cluster {address}: no scheduler of dask answers there ({error})") from None
         with client:
             _check_workers(client, address)
+            if modules is not None:
+                client.register_worker_callbacks(partial(look_in, str(modules)))
             try:
                 # Every task runs for itself: equal ones are not the same.
                 yield client.get_executor(pure=False).submit, lambda: sum(client.nthreads().values())
@@ -77,6 +85,12 @@ def _check_workers(client: Any, address: str) -> None:
     for worker, got in found.items():
         if got != expected:
             raise OptionError(f"cluster {address}: expected inphase {expected} on {worker}, got {got}")
+
+
+def look_in(folder: str) -> None:
+    """Find modules there, too, where this is called."""
+    if folder not in sys.path:
+        sys.path.insert(0, folder)
 
 
 def version() -> str:

@@ -9,6 +9,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
@@ -44,21 +45,23 @@ class Team:
                 label, task = waiting.popleft()
                 running[self.start(task)] = label
             done, _ = wait(running, return_when=FIRST_COMPLETED)
-            for future in done:
+            for future in sorted(done, key=lambda future: future.exception() is not None):  # first what is done well
                 yield running.pop(future), future.result()
 
 
 @contextmanager
-def workers(jobs: int = 1, cluster: str | None = None) -> Iterator[Team]:
+def workers(jobs: int = 1, cluster: str | None = None, modules: Path | None = None) -> Iterator[Team]:
     """One process, which is this one, or more, or instead of them the workers of a dask cluster.
 
-    cluster: the address of its scheduler (tcp://host:port). What workers are sent may be closures. Raises OptionError
-    for less than one job and for a cluster that does not answer, WorkerError where workers are lost for good.
+    cluster: the address of its scheduler (tcp://host:port). modules: a folder that all workers see, where those of a
+    cluster look for modules, too; others look where this process does. What workers are sent may be closures. Raises
+    OptionError for less than one job and for a cluster that does not answer, WorkerError where workers are lost for
+    good.
     """
     if not (isinstance(jobs, (int, np.integer)) and jobs >= 1):
         raise OptionError(f"jobs: expected a whole number of at least 1, got {jobs!r}")
     if cluster is not None:
-        with connected(cluster) as (submit, threads):
+        with connected(cluster, modules) as (submit, threads):
             yield Team(lambda task: submit(_elsewhere, task), lambda: AHEAD * threads())
     elif jobs == 1:
         import scipy.linalg  # noqa: F401 - it brings a BLAS of its own, which can be limited once it is there
