@@ -1,7 +1,7 @@
 """How accurate every filter is on real recordings, beside the baselines: all conditions, four-fold cross-validation.
 
-Writes docs/accuracy.md, whole or not at all. With five filters it takes a quarter of an hour or more on two idle processors;
-`--quick` runs the same on a few short episodes under one condition, as the tests do.
+Writes docs/accuracy.md, whole or not at all. With five filters it takes a quarter of an hour or more on two idle
+processors; `--quick` runs the same on a few short episodes under one condition, as the tests do.
 """
 
 from __future__ import annotations
