@@ -114,8 +114,8 @@ def completion(settings: Settings, found: Found, page: Page) -> None:
     table = Table("Time-to-Completion", columns)
     for name, cells in rows.items():
         method, _, speed = name.rpartition(", ")
-        theirs = THEIRS[speed.replace(" ", "")] if method in ("bip", "") else ("", "", "")
-        table.add(name, dict(zip(columns, cells, strict=True)), dict(zip(columns, theirs, strict=True)))
+        theirs = dict(zip(columns, THEIRS[speed.replace(" ", "")], strict=True)) if method in ("bip", "") else None
+        table.add(name, dict(zip(columns, cells, strict=True)), theirs)
     page.table(table)
     page.say(
         "Shares of the 10 s, beside the dissertation's numbers. **Bold**: the smallest of a column among one method "
