@@ -39,6 +39,13 @@ def test_air_that_cannot_leave_keeps_pressure_times_volume() -> None:
     np.testing.assert_allclose((air.pressure + AIR) * after, (begun + AIR) * before, rtol=1e-9)
 
 
+def test_a_muscle_that_is_stretched_to_its_threads_keeps_room_for_its_air() -> None:
+    """A cylinder has no negative volume: further than its threads are long, nothing of it changes."""
+    volume = np.array([SIZES.volume(np.full(COUNT, short)) for short in np.linspace(0.1, -0.4, 51)])
+    assert (volume > 0).all()
+    assert (np.diff(volume, axis=0) <= 0).all()
+
+
 def test_the_valves_reach_what_they_are_told_and_not_at_once() -> None:
     held = np.full(COUNT, 0.1)
     air = Pneumatics(SIZES, np.full(COUNT, 0.2), held)
