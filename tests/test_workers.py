@@ -14,6 +14,7 @@ import time
 import types
 from collections import deque
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from threading import Thread, Timer
@@ -123,12 +124,46 @@ def test_closures_go_to_the_workers(demos, cluster):
     assert rows == [rows[0]] * 3
 
 
-def test_workers_of_a_cluster_find_modules_where_they_are_told_to(cluster, tmp_path, monkeypatch):
+@contextmanager
+def cluster_elsewhere(folder: Path) -> Iterator[str]:
+    """The address of a scheduler with one worker, processes that were started by hand in another folder."""
+    run = partial(subprocess.Popen, cwd=folder, stderr=subprocess.PIPE, text=True)
+    scheduler = run(
+        [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+    )
+    try:
+        address = next(found[0] for line in scheduler.stderr if (found := re.search(r"tcp://127\.0\.0\.1:\d+", line)))
+        worker = run(
+            [
+                sys.executable,
+                "-m",
+                "distributed.cli.dask_worker",
+                address,
+                "--nthreads",
+                "1",
+                "--no-dashboard",
+                "--no-nanny",
+            ]
+        )
+        try:
+            next(line for line in worker.stderr if "Registered to" in line)
+            yield address
+        finally:
+            worker.kill()
+            worker.communicate()
+    finally:
+        scheduler.kill()
+        scheduler.communicate()
+
+
+def test_a_cluster_finds_modules_where_it_is_told_to(tmp_path, monkeypatch):
     """As those of the studies, which are not installed; this process finds them by itself."""
-    (tmp_path / "far_from_here.py").write_text("def there(x):\n    return 2 * x\n")
-    monkeypatch.syspath_prepend(str(tmp_path))
+    modules = tmp_path / "modules"
+    modules.mkdir()
+    (modules / "far_from_here.py").write_text("def there(x):\n    return 2 * x\n")
+    monkeypatch.syspath_prepend(str(modules))
     there = importlib.import_module("far_from_here").there
-    with workers(cluster=cluster, modules=tmp_path) as team:
+    with cluster_elsewhere(tmp_path) as address, workers(cluster=address, modules=modules) as team:
         assert team.run(there, [(1,), (2,)]) == [2, 4]
 
 

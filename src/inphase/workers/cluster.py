@@ -48,9 +48,9 @@ def connected(
 ) -> Iterator[tuple[Callable[..., Future[Any]], Callable[[], int]]]:
     """What submits work to a cluster, and what counts the threads of its workers.
 
-    modules: a folder where workers look for modules, too; those who come later as well. The work of a worker that dies
-    is given to another. Raises OptionError where none answers, the cluster has no workers or theirs is another inphase,
-    and WorkerError for a cluster that is lost, or work that kills its workers.
+    modules: a folder where scheduler and workers look for modules, too; those who come later as well. The work of a
+    worker that dies is given to another. Raises OptionError where none answers, the cluster has no workers or theirs is
+    another inphase, and WorkerError for a cluster that is lost, or work that kills its workers.
     """
     check_address(address)
     from distributed import Client, KilledWorker
@@ -64,6 +64,7 @@ def connected(
         with client:
             _check_workers(client, address)
             if modules is not None:
+                client.run_on_scheduler(look_in, str(modules))  # it reads what there is to do, too
                 client.register_worker_callbacks(partial(look_in, str(modules)))
             try:
                 # Every task runs for itself: equal ones are not the same.
