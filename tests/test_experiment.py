@@ -42,3 +42,12 @@ def test_the_quick_study_tells_everything(name, tmp_path):
     assert f"wrote {folder / name}.md" in out
     if name == "handwriting":
         assert quickly(name, folder) == out  # at once, and the same
+
+
+def test_a_page_without_a_place_for_the_study_is_told_before_the_work(tmp_path):
+    page, folder = tmp_path / "page.md", tmp_path / "results"
+    page.write_text("# Another page\n", encoding="utf-8")
+    command = [sys.executable, "-m", "inphase.cli", "experiment", "handwriting", "--page", str(page), "-o", str(folder)]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, encoding="utf-8")
+    assert (result.returncode, folder.exists()) == (2, False)
+    assert "expected the lines '<!-- begin handwriting -->'" in result.stderr
