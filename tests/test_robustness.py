@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from interactions import NOISE_STD, curves, dataset, taught
+from interactions import NOISE_STD, curves, dataset, shapes_unchecked, taught
 
 import inphase
+from inphase.errors import OptionError
 from inphase.filters import FILTERS
 from inphase.result import Status
 
@@ -221,6 +222,8 @@ def test_who_wants_it_has_every_reading_taken_at_its_word(model: inphase.Model) 
         heard = [session.observe(i / COUNT, sample) for session in (wary, plain)]
         assert (heard[0] == heard[1]) == (i < 20)
     assert [estimate.status is Status.REFUSED for estimate in heard] == [True, False]
+    with shapes_unchecked(), pytest.raises(OptionError, match="slips: expected true or false, got 'no'"):
+        model.session(slips="no")  # type: ignore[arg-type]
 
 
 # ------------------------------------------------------------------------------------------------------ someone else

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ pytest.importorskip("mink")
 import mujoco
 
 from experiments.bodies.person import SHARES
+from experiments.cooperation import demonstrations
 from experiments.cooperation.demonstrations import distorted, without
 from experiments.cooperation.guide import RATE, frame, led
 from experiments.cooperation.people import Track, someone
@@ -22,6 +24,7 @@ from experiments.cooperation.sensors import CONTROLLED, OBSERVED, TICK, TRACKED,
 from experiments.cooperation.tasks import WORN
 from experiments.cooperation.trial import Hand, Trial, demonstrated
 from experiments.cooperation.world import HANDOVER, LIFT, STEP, Place, World
+from experiments.study import Settings
 from inphase.trajectory import Demonstration
 
 FEET = np.array([[0.0, -0.12, 0.0], [0.0, 0.12, 0.0]])
@@ -248,3 +251,17 @@ def test_of_what_is_not_worn_nothing_is_read(shown, worn, read):
     assert seen.all(0).sum() == read
     np.testing.assert_array_equal(left[np.isfinite(left)], demonstration.values[np.isfinite(left)])
     np.testing.assert_array_equal(left[:, len(OBSERVED) :], demonstration.values[:, len(OBSERVED) :])
+
+
+def test_a_demonstration_that_is_not_done_is_made_anew(monkeypatch):
+    """With another plan; else one trial would be missing, and others be taken for it."""
+    whole, plans = demonstrations.demonstrated, []
+
+    def fails_first(plan, rng):
+        plans.append(plan)
+        return replace(whole(plan, rng), done=len(plans) > 1)
+
+    monkeypatch.setattr(demonstrations, "demonstrated", fails_first)
+    found = demonstrations.record(Settings(True, 0, Path()), "lift", [3])
+    assert (int(found["tried3"]), len(plans)) == (1, 2)
+    assert not np.array_equal(plans[0].thing, plans[1].thing)

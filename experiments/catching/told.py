@@ -65,8 +65,12 @@ def prediction(settings: Settings, found: Found, page: Page) -> None:
         "a session takes when no filter is named. One model of all modalities serves all rows: what a row does not "
         "name is not observed."
     )
-    early, count = _seen_by(MARKS[0], gathered(settings.of("demonstrations")))
-    page.say(f"At {MARKS[0]:.0%} the ball has been seen in {early} of {count} throws, at {MARKS[1]:.0%} in all.")
+    demonstrated = gathered(settings.of("demonstrations"))
+    early, late = (_seen_by(mark, demonstrated) for mark in MARKS)
+    page.say(
+        f"At {MARKS[0]:.0%} the ball has been seen in {early} of {len(demonstrated)} throws, at {MARKS[1]:.0%} in "
+        f"{late}."
+    )
     told = {"joints": JOINTS_TOLD, "ball": BALL_TOLD}
     for what in COLUMNS_OF:
         _errors(page, found, what, METHODS, told[what])
@@ -76,11 +80,10 @@ def prediction(settings: Settings, found: Found, page: Page) -> None:
     page.say(f"At 82 % with all modalities, `rbpf` has {theirs:.2f} times the joint error of eBIP as written.")
 
 
-def _seen_by(mark: float, dataset: Dataset) -> tuple[int, int]:
-    """In how many demonstrations the ball was seen before that phase, and of how many."""
+def _seen_by(mark: float, dataset: Dataset) -> int:
+    """In how many demonstrations the ball was seen before that phase."""
     ball = dataset.names.index("ball_x")
-    seen = [d.phases[np.isfinite(d.values[:, ball])][0] < mark for d in dataset]
-    return sum(seen), len(seen)
+    return sum(bool(np.isfinite(d.values[d.phases < mark, ball]).any()) for d in dataset)
 
 
 def noise(settings: Settings, found: Found, page: Page) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import inphase
-from experiments.study.page import Page, place  # noqa: F401 - `inphase experiment` asks whether there is one
+from experiments.study.page import Page
 from experiments.study.plan import Settings, Study, Task
 from experiments.study.stored import SECONDS, digest
 from inphase.errors import OptionError

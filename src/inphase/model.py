@@ -169,7 +169,7 @@ class Model:
 
         slips: whether a reading that surprises is held back for a moment, as it may be a slip of the sensor; False
         takes every reading at its word.
-        Raises OptionError for an unknown filter or option.
+        Raises OptionError for an unknown filter or option, or another value of `slips`.
         """
         from inphase.session import Session
 

@@ -42,6 +42,8 @@ class Session:
     def __init__(
         self, model: Model, filter: str | None = None, seed: int = 0, *, slips: bool = True, **options: Any
     ) -> None:
+        if not isinstance(slips, bool):  # a text of a configuration would be true, whatever it says
+            raise OptionError(f"slips: expected true or false, got {slips!r}")
         self.model = model
         self._wary = slips
         self._filter = make(RECOMMENDED if filter is None else filter, model, **options)

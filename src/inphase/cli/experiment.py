@@ -60,7 +60,7 @@ def experiment(
     studying = importlib.import_module("experiments.study.conduct")
     study = studying.load(name)
     if page is not None:
-        studying.place(page, name)  # told before the long work
+        importlib.import_module("experiments.study.page").place(page, name)  # told before the long work
     folder = (output or Path("inphase-studies") / (f"{name}-quick" if quick else name)).resolve()
     settings = studying.Settings(quick=quick, seed=seed, folder=folder)
     console = Output()
